@@ -1,0 +1,49 @@
+# stiffdice: `make paper` rebuilds the paper, `make test` runs all tests; both set themselves up.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.installed
+CORES ?= $(shell nproc 2>/dev/null || echo 2)
+STUDY ?= paper
+
+.DEFAULT_GOAL := help
+.PHONY: help install paper study report test lint types check lock clean
+
+help:  ## show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+install: $(READY)  ## set up .venv from the lock file (the other targets do it, too)
+
+$(READY): requirements/build.lock requirements/requirements.lock pyproject.toml requirements/install
+	@PYTHON="$(PYTHON)" requirements/install $(VENV)
+	@touch $@
+
+paper: $(READY)  ## rebuild everything the paper shows, into results/paper/
+	@$(BIN)/python workflow/run.py --cores $(CORES) paper
+
+study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
+	@$(BIN)/python workflow/run.py --cores $(CORES) study --config study=$(STUDY)
+
+report: paper  ## results/paper/report.html: every figure with its caption, code and configuration
+	@$(BIN)/snakemake --cores $(CORES) paper --report results/paper/report.html
+
+test: $(READY)  ## run all tests
+	@$(BIN)/python -m pytest
+
+lint: $(READY)  ## check style (ruff) and the workflow (snakemake --lint)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/snakemake --lint
+
+types: $(READY)  ## check types (mypy)
+	@$(BIN)/mypy
+
+check: lint types test  ## all of the above
+
+lock: $(READY)  ## renew the lock files from requirements/*.in (needs uv on the PATH)
+	@for name in build requirements; do \
+	  uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
+	    --no-emit-index-url --custom-compile-command "make lock" \
+	    requirements/$$name.in -o requirements/$$name.lock; done
+
+clean:  ## remove results (keeps .venv)
+	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -r {} + ; rm -rf .snakemake

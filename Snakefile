@@ -1,0 +1,30 @@
+# stiffdice: config -> scenes -> runs -> shards -> sweep -> frontier -> figures.
+#
+#   snakemake paper                       everything the paper shows
+#   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
+#
+# A study is a file in config/; its results lie in results/ under the same name.
+
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/scenes.smk"
+include: "workflow/rules/sweep.smk"
+include: "workflow/rules/figures.smk"
+
+
+report: "workflow/report/workflow.rst"
+
+
+rule paper:
+    default_target: True
+    input:
+        everything_of("paper"),
+
+
+rule study:
+    input:
+        everything_of(config.get("study", "paper")),

@@ -1,0 +1,170 @@
+"""The command `stiffdice`. Imports what a subcommand needs only when it is called, so that --help is quick."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from stiffdice import __version__
+from stiffdice.errors import InputError, StiffdiceError
+
+EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-09.yaml --model sliding -o stiff.h5
+  stiffdice run my-cube.yaml --steps 1e5 --set ground.stiffness=1e6 --set cube.mass=0.02 -o out.h5
+  stiffdice inspect stiff.h5
+"""
+RUN_EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
+  stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
+  stiffdice run my-cube.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o out.h5
+
+The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
+its verdict; 2 for bad input.
+"""
+INSPECT_EXAMPLES = """\
+examples:
+  stiffdice inspect throw.h5
+  stiffdice inspect results/paper/sweep/sweep.h5
+  stiffdice inspect throw.h5 --json
+"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="stiffdice",
+        description="How many time steps does a stiff ground cost, and what do you get for them?",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    _add_run(commands)
+    _add_inspect(commands)
+    return parser
+
+
+def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
+    run = commands.add_parser(
+        "run",
+        help="run one scene and store its trajectory and verdict",
+        description="Run one scene and store its trajectory and verdict in one HDF5 file.",
+        epilog=RUN_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
+    run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
+    run.add_argument("--model", default="tumbling", metavar="M", help="sliding or tumbling (default: tumbling)")
+    run.add_argument(
+        "--scheme",
+        default="symplectic_euler",
+        metavar="NAME",
+        help="time-stepping scheme (default: symplectic_euler)",
+    )
+    run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
+    run.add_argument(
+        "--every",
+        metavar="K",
+        help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
+    )
+    run.add_argument("--preset", metavar="P", help="as_listed, as_written or corrected: defaults of the physics")
+    run.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY.PATH=VALUE",
+        help="set one key of the scene; may be given more than once",
+    )
+    run.set_defaults(call=_run)
+
+
+def _add_inspect(commands: argparse._SubParsersAction[_Parser]) -> None:
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a file holds: its verdict, its scene, its variables",
+        description="Say what a file of stiffdice holds: its verdict, its scene, its variables.",
+        epilog=INSPECT_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    inspect.add_argument("file", metavar="FILE.h5")
+    inspect.add_argument("--json", action="store_true", help="the same for programs")
+    inspect.set_defaults(call=_inspect)
+
+
+def _whole(option: str, text: str) -> int:
+    """Return the whole number in an option's text; 1e5 counts as one."""
+    from stiffdice import checks
+
+    try:
+        return checks.count(option, int(text))
+    except ValueError:
+        pass
+    try:
+        return checks.count(option, float(text))
+    except ValueError:
+        raise InputError(f"{option} = {text}: allowed is a whole number >= 1") from None
+
+
+def _run(options: argparse.Namespace) -> None:
+    from stiffdice import scene as scenes
+    from stiffdice.io.write import check_target
+
+    scene = scenes.load(options.scene, options.overrides, options.preset)
+    steps = _whole("--steps", options.steps)
+    target = check_target(options.output)
+
+    # These take about a second to import; bad input is told before.
+    from stiffdice.io.layout import run_dataset
+    from stiffdice.io.write import write_dataset
+    from stiffdice.progress import Progress
+    from stiffdice.simulate import default_every, simulate
+    from stiffdice.verdict import Verdict
+
+    every = default_every(steps) if options.every is None else _whole("--every", options.every)
+    with Progress() as progress:
+        run = simulate(
+            scene,
+            model=options.model,
+            scheme=options.scheme,
+            steps=steps,
+            every=every,
+            progress=progress.show,
+        )
+    write_dataset(run_dataset(run), target)
+    print(f"{target}: {Verdict(run.verdict[0]).sentence}")
+
+
+def _inspect(options: argparse.Namespace) -> None:
+    from stiffdice import inspection
+    from stiffdice.io.read import open_file
+
+    dataset = open_file(options.file)
+    print(inspection.as_json(dataset) if options.json else inspection.as_text(dataset, options.file))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.call(options)
+    except StiffdiceError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stiffdice: interrupted; nothing was stored", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # as in `stiffdice inspect FILE | head`
+        sys.stderr.close()
+        return 0
+    return 0

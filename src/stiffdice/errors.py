@@ -1,0 +1,19 @@
+"""What goes wrong through no fault of the program, told in one line."""
+
+from __future__ import annotations
+
+
+class StiffdiceError(Exception):
+    """An error whose message is written for the person who ran the command: one line, exit status 2."""
+
+
+class InputError(StiffdiceError):
+    """A scene, study, option or file that cannot be used; names the key, the value and what is allowed."""
+
+    def within(self, source: str) -> InputError:
+        """Return the same error, told with the file it was found in."""
+        return InputError(f"{source}: {self}")
+
+
+class OutputError(StiffdiceError):
+    """A result that could not be stored; nothing is left under its final name."""

@@ -1,0 +1,81 @@
+"""What a file holds, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+import yaml
+
+_LONG = ("scene", "scene_digest", "code_digest", "analysis_code_digest", "title", "Conventions")
+
+
+def as_text(dataset: xr.Dataset, name: str) -> str:
+    """Return a page on a dataset: what it is, its verdict, its scene, its variables with units."""
+    attributes = dataset.attrs
+    lines = [f"{name}: {attributes.get('title', 'untitled')}", ""]
+    lines += [f"  {key}: {_plain(value)}" for key, value in attributes.items() if key not in _LONG]
+    lines += ["", "verdict", *_verdicts(dataset)]
+    if "scene" in attributes:
+        scene = yaml.safe_dump(json.loads(attributes["scene"]), sort_keys=False, default_flow_style=None, width=100)
+        lines += ["", "scene", *(f"  {line}" for line in scene.splitlines())]
+    lines += ["", "variables", *_variables(dataset)]
+    return "\n".join(lines)
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute as plain data."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _verdicts(dataset: xr.Dataset) -> list[str]:
+    if "verdict" not in dataset:
+        return ["  none: this file holds no runs"]
+    counts = _verdict_counts(dataset)
+    total = sum(counts.values())
+    if total == 1:
+        measures = [
+            f"  {name} = {float(variable):.6g}: {variable.attrs['long_name']}"
+            for name, variable in dataset.data_vars.items()
+            if variable.ndim == 0 and str(name).endswith(("_ratio", "_phase"))
+        ]
+        return [f"  {dataset.attrs.get('verdict_text', next(iter(counts)))}", *measures]
+    return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
+
+
+def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
+    """Return how many runs ended with each verdict, those that none ended with left out."""
+    names = str(dataset.verdict.attrs["flag_meanings"]).split()
+    counts = np.bincount(dataset.verdict.values.astype(int).ravel(), minlength=len(names))
+    return {name: int(count) for name, count in zip(names, counts, strict=True) if count}
+
+
+def _variables(dataset: xr.Dataset) -> list[str]:
+    rows = []
+    for name, variable in dataset.variables.items():
+        sizes = " × ".join(f"{size} {dim}" for dim, size in variable.sizes.items()) or "one value"
+        rows.append((str(name), sizes, f"[{variable.attrs.get('units', '?')}]", variable.attrs.get("long_name", "")))
+    widths = [max(len(row[k]) for row in rows) for k in range(3)]
+    return [
+        "  " + "  ".join([*(part.ljust(width) for part, width in zip(row, widths, strict=False)), row[3]])
+        for row in rows
+    ]
+
+
+def as_json(dataset: xr.Dataset) -> str:
+    """Return the same as JSON: attributes, sizes, verdicts and variables."""
+    attributes = {key: _plain(value) for key, value in dataset.attrs.items()}
+    if "scene" in attributes:
+        attributes["scene"] = json.loads(attributes["scene"])
+    content = {
+        "attributes": attributes,
+        "sizes": {str(name): size for name, size in dataset.sizes.items()},
+        "verdicts": _verdict_counts(dataset) if "verdict" in dataset else {},
+        "variables": {
+            str(name): {"dimensions": list(variable.dims), "units": variable.attrs.get("units")}
+            for name, variable in dataset.variables.items()
+        },
+    }
+    return json.dumps(content, indent=2)

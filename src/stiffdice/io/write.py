@@ -1,0 +1,71 @@
+"""Files that are whole or not there: made in memory, written under a temporary name, fsynced, renamed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from stiffdice.errors import OutputError
+
+
+def check_target(path: str | Path) -> Path:
+    """Return `path` if a file can be written there; raises OutputError before any work is done otherwise."""
+    target = Path(path)
+    if target.is_dir():
+        raise OutputError(f"{target}: is a folder; name a file in it")
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: the folder {target.parent} does not exist")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise OutputError(f"{target}: the folder {target.parent} is not writable")
+    return target
+
+
+def write_bytes(data: bytes | memoryview, path: str | Path) -> None:
+    """Store `data` under `path`; raises OutputError, and leaves what was there before, if it cannot."""
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        try:
+            with temporary.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
+        _sync_folder(target.parent)
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a rename last through a power failure."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
+    """Store a dataset as netCDF-4 on HDF5; raises OutputError if it cannot.
+
+    Compressed (gzip, shuffle) with a checksum on every chunk (fletcher32). Equal datasets give equal bytes.
+    """
+    image = dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset))
+    write_bytes(memoryview(image), path)
+
+
+def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, object]]:
+    encoding: dict[str, dict[str, object]] = {}
+    for name, variable in dataset.variables.items():
+        encoding[str(name)] = {}
+        # Missing values are NaN here; a _FillValue would say so twice, and coordinates must have none.
+        if np.issubdtype(variable.dtype, np.floating):
+            encoding[str(name)]["_FillValue"] = None
+        if variable.size > 1:
+            encoding[str(name)] |= {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
+    return encoding

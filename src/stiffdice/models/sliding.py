@@ -1,0 +1,51 @@
+"""`sliding`: translation only, the paper's ground_cube.m. The cube keeps the orientation it starts with."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from stiffdice.compiled import njit
+from stiffdice.contact import Wrench, node_force, reaches
+from stiffdice.models.state import Physics
+
+
+class Sliding(NamedTuple):
+    """The tag of this model."""
+
+
+TAG = Sliding()
+
+
+@njit
+def force(law: Any, physics: Physics, state: Any) -> Wrench:
+    """Return the total force on the cube [N]; its torque is left out."""
+    x, y, z = state.position[0], state.position[1], state.position[2]
+    height = physics.nx * x + physics.ny * y + physics.nz * z
+    if not reaches(law, height - physics.reach):
+        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    nodes = state.node_offset
+    fx = fy = fz = 0.0
+    for k in range(nodes.shape[0]):
+        depth = -(physics.nx * (x + nodes[k, 0]) + physics.ny * (y + nodes[k, 1]) + physics.nz * (z + nodes[k, 2]))
+        gx, gy, gz = node_force(law, physics, depth, ux, uy, uz)
+        fx += gx
+        fy += gy
+        fz += gz
+    return fx, fy, fz, 0.0, 0.0, 0.0
+
+
+@njit
+def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
+    """Advance the velocity by h [s] under a force (equation 6)."""
+    state.velocity[0] += h * wrench[0] / physics.mass
+    state.velocity[1] += h * wrench[1] / physics.mass
+    state.velocity[2] += h * wrench[2] / physics.mass
+
+
+@njit
+def drift(physics: Physics, state: Any, h: float) -> None:
+    """Advance the position by h [s] at the state's velocity (equation 7)."""
+    state.position[0] += h * state.velocity[0]
+    state.position[1] += h * state.velocity[1]
+    state.position[2] += h * state.velocity[2]

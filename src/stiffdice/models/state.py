@@ -1,0 +1,93 @@
+"""What a kernel works on: the state of one rigid body, and the physics it moves in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from stiffdice.cube import SIGNS
+from stiffdice.scene import Scene
+
+Array = npt.NDArray[np.float64]
+States = npt.NDArray[np.void]  # of STATE
+
+
+# A rigid body; kernels change it in place. position [m], velocity [m/s], angular_momentum [kg m²/s], angular_velocity
+# [rad/s], the last as the nodes' velocities use it; node_offset [m]: relative to the centre (the listings' X_rel).
+# One record is one state; an array of records is an ensemble or a trajectory. Records reach compiled code as bare
+# pointers, where tuples of arrays would cost a reference count at every call (20 times the work of a step).
+STATE = np.dtype(
+    [
+        ("position", np.float64, 3),
+        ("velocity", np.float64, 3),
+        ("angular_momentum", np.float64, 3),
+        ("angular_velocity", np.float64, 3),
+        ("node_offset", np.float64, (len(SIGNS), 3)),
+    ]
+)
+
+
+class Physics(NamedTuple):
+    """The numbers of a scene that the forces need; SI units, the ground's constants per node."""
+
+    mass: float
+    gravity: float
+    inertia: float
+    stiffness: float
+    damping: float
+    friction: float
+    nx: float
+    ny: float
+    nz: float
+    cutoff: float  # [m/s] of regularised friction: 1e-6 r in the listings
+    node_weight: float  # [N]
+    weight: float  # [N] of all nodes, summed one by one as the listings sum forces
+    reach: float  # [m] no node is farther from the centre
+
+
+def physics_of(scene: Scene) -> Physics:
+    """Return the scene's numbers as a kernel takes them."""
+    nodes = scene.cube.node_offsets()
+    node_weight = scene.cube.mass / len(nodes) * scene.gravity
+    weight = 0.0
+    for _ in nodes:
+        weight += node_weight
+    return Physics(
+        scene.cube.mass,
+        scene.gravity,
+        scene.cube.moment_of_inertia,
+        scene.ground.stiffness,
+        scene.ground.damping,
+        scene.ground.friction,
+        *scene.ground.normal,
+        cutoff=1e-6 * scene.cube.radius,
+        node_weight=node_weight,
+        weight=weight,
+        # The margin covers what rotating the nodes step by step can add in round-off.
+        reach=float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6),
+    )
+
+
+def start_of(scene: Scene) -> States:
+    """Return the state at the launch, shape (1,)."""
+    launch = scene.launch
+    state = np.zeros(1, STATE)
+    state["position"] = launch.position
+    state["velocity"] = launch.velocity
+    state["angular_momentum"] = launch.spin
+    if launch.node_velocity == "rigid":
+        state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
+    state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
+    return state
+
+
+def rotated(offsets: Array, rotation: Array) -> Array:
+    """Return offsets, shape (node, 3), turned by a rotation vector [rad] (Rodrigues' formula, equation 9)."""
+    angle = float(np.linalg.norm(rotation))
+    if angle == 0:
+        return offsets.copy()
+    axis = rotation / angle
+    along = np.outer(offsets @ axis, axis)
+    return np.asarray(along + np.cos(angle) * (offsets - along) + np.sin(angle) * np.cross(axis, offsets))

@@ -1,0 +1,94 @@
+"""`tumbling`: translation and rotation of a rigid cube, the paper's real_throw_cube.m."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from stiffdice.compiled import njit
+from stiffdice.contact import Wrench, node_force, reaches
+from stiffdice.models import sliding
+from stiffdice.models.state import Physics
+
+
+class Tumbling(NamedTuple):
+    """The tag of this model."""
+
+
+TAG = Tumbling()
+
+
+@njit
+def force(law: Any, physics: Physics, state: Any) -> Wrench:
+    """Return the total force [N] and torque about the centre [N m] (equations 3 and 10)."""
+    x, y, z = state.position[0], state.position[1], state.position[2]
+    height = physics.nx * x + physics.ny * y + physics.nz * z
+    if not reaches(law, height - physics.reach):
+        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
+    nodes = state.node_offset
+    fx = fy = fz = tx = ty = tz = 0.0
+    for k in range(nodes.shape[0]):
+        rx, ry, rz = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        depth = -(physics.nx * (x + rx) + physics.ny * (y + ry) + physics.nz * (z + rz))
+        vx = ux + (wy * rz - wz * ry)
+        vy = uy + (wz * rx - wx * rz)
+        vz = uz + (wx * ry - wy * rx)
+        gx, gy, gz = node_force(law, physics, depth, vx, vy, vz)
+        fx += gx
+        fy += gy
+        fz += gz
+        tx += ry * gz - rz * gy
+        ty += rz * gx - rx * gz
+        tz += rx * gy - ry * gx
+    return fx, fy, fz, tx, ty, tz
+
+
+@njit
+def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
+    """Advance velocity and angular momentum by h [s] under force and torque (equations 6 and 8)."""
+    sliding.kick(physics, state, wrench, h)
+    state.angular_momentum[0] += h * wrench[3]
+    state.angular_momentum[1] += h * wrench[4]
+    state.angular_momentum[2] += h * wrench[5]
+
+
+@njit
+def drift(physics: Physics, state: Any, h: float) -> None:
+    """Advance position and orientation by h [s] at the state's velocity and spin (equations 7 and 9)."""
+    sliding.drift(physics, state, h)
+    wx = state.angular_momentum[0] / physics.inertia
+    wy = state.angular_momentum[1] / physics.inertia
+    wz = state.angular_momentum[2] / physics.inertia
+    state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2] = wx, wy, wz
+    rate = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if rate > 0.0:
+        _rotate(state, wx / rate, wy / rate, wz / rate, rate * h)
+
+
+@njit
+def _rotate(state: Any, ax: float, ay: float, az: float, angle: float) -> None:
+    """Turn the nodes about a unit axis: R = P + cos(angle)·(E − P) + sin(angle)·A, after equation 9."""
+    c, s = math.cos(angle), math.sin(angle)
+    rxx, rxy, rxz = (
+        ax * ax + c * (1 - ax * ax),
+        ax * ay - c * (ax * ay) - s * az,
+        ax * az - c * (ax * az) + s * ay,
+    )
+    ryx, ryy, ryz = (
+        ay * ax - c * (ay * ax) + s * az,
+        ay * ay + c * (1 - ay * ay),
+        ay * az - c * (ay * az) - s * ax,
+    )
+    rzx, rzy, rzz = (
+        az * ax - c * (az * ax) - s * ay,
+        az * ay - c * (az * ay) + s * ax,
+        az * az + c * (1 - az * az),
+    )
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        nodes[k, 0] = rxx * x + rxy * y + rxz * z
+        nodes[k, 1] = ryx * x + ryy * y + ryz * z
+        nodes[k, 2] = rzx * x + rzy * y + rzz * z

@@ -1,0 +1,40 @@
+"""How far a long run is, on standard error; a run of under two seconds says nothing."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+
+QUIET_SECONDS = 2.0
+
+
+class Progress:
+    """A line that rewrites itself on a terminal, or a line every ten seconds elsewhere."""
+
+    def __init__(self) -> None:
+        self._begun = time.monotonic()
+        self._terminal = sys.stderr.isatty()
+        self._interval = 0.2 if self._terminal else 10.0
+        self._next = self._begun + QUIET_SECONDS
+        self._shown = False
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def show(self, fraction: float) -> None:
+        """Tell the fraction done, if it is time to."""
+        now = time.monotonic()
+        if now < self._next or fraction >= 1:
+            return
+        self._next = now + self._interval
+        self._shown = True
+        left = (now - self._begun) * (1 - fraction) / fraction
+        end = "\r" if self._terminal else "\n"
+        print(f"{fraction:6.1%} done, about {left:.0f} s left  ", end=end, file=sys.stderr, flush=True)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._shown and self._terminal:
+            print(" " * 40, end="\r", file=sys.stderr, flush=True)

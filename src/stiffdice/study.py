@@ -1,0 +1,227 @@
+"""A study: one sweep with its question, one YAML file. What it asks for, checked, and which cells answer it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiffdice import checks, theory
+from stiffdice import scene as scenes
+from stiffdice.errors import InputError
+from stiffdice.io import yaml_file
+from stiffdice.scene import Scene
+
+
+class Cell(NamedTuple):
+    """One point of a sweep, with all its members."""
+
+    contact: str
+    stiffness: float  # [kg/s²]
+    steps: int
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One scene to be run, once for each reading of the paper's physics."""
+
+    scene: str
+    presets: tuple[str, ...]
+    model: str
+    scheme: str
+    steps: int
+    every: int
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A grid of stiffness and steps, in shards."""
+
+    scene: Scene
+    model: str
+    scheme: str
+    contact: tuple[str, ...]
+    stiffness: Mapping[str, float]
+    steps: Mapping[str, float] | None
+    omega_h: Mapping[str, float] | None
+    members: int
+    seed: int
+    cells_per_shard: int
+
+    def scene_of(self, cell: Cell) -> Scene:
+        """Return the sweep's scene on the ground of a cell."""
+        return self.scene.with_ground(contact=cell.contact, stiffness=cell.stiffness)
+
+    def cells(self) -> list[Cell]:
+        """Return all cells: contact law by law, stiffness by stiffness, steps ascending."""
+        return [
+            Cell(contact, stiffness, steps)
+            for contact in self.contact
+            for stiffness in _geometric(self.stiffness)
+            for steps in self._steps_of(stiffness)
+        ]
+
+    def _steps_of(self, stiffness: float) -> list[int]:
+        """Return the step counts tried at one stiffness: spread evenly in their logarithm, jittered within each part.
+
+        Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
+        """
+        if self.steps is not None:
+            ends, count = (self.steps["from"], self.steps["to"]), int(self.steps["count"])
+        else:
+            assert self.omega_h is not None
+            scene = self.scene.with_ground(stiffness=stiffness)
+            ends = (
+                theory.steps_for(scene, self.omega_h["from"]),
+                theory.steps_for(scene, self.omega_h["to"]),
+            )
+            count = int(self.omega_h["count"])
+        key = int.from_bytes(hashlib.sha256(repr(stiffness).encode()).digest()[:8])
+        part = (np.arange(count) + np.random.default_rng([self.seed, key]).random(count)) / count
+        low, high = np.log(min(ends)), np.log(max(ends))
+        return sorted({max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)})
+
+    def shards(self) -> dict[str, list[Cell]]:
+        """Return the cells of each shard, by the shard's id: a digest of all that its numbers depend on but the code.
+
+        Cells are dealt out in turn, so that every shard gets its share of the expensive ones.
+        """
+        cells = self.cells()
+        count = -(-len(cells) // self.cells_per_shard)
+        return {self._digest(cells[k::count]): cells[k::count] for k in range(count)}
+
+    def _digest(self, cells: Sequence[Cell]) -> str:
+        parts = [self.scene.digest, self.model, self.scheme, self.members, cells]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
+
+
+@dataclass(frozen=True)
+class PlannedFigure:
+    """One figure: what to draw (a name of `figures.DRAWINGS`), of which run (none for the sweep's)."""
+
+    draw: str
+    run: str | None
+    title: str
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything one YAML file in config/ asks for."""
+
+    name: str
+    question: str
+    runs: Mapping[str, PlannedRun]
+    sweep: Sweep | None
+    tolerances: Mapping[str, float]
+    figures: Mapping[str, PlannedFigure]
+    dpi: int
+
+
+def load(path: str | Path, schema: str | Path) -> Study:
+    """Return the study in a YAML file, checked against the JSON schema in another and with its scenes read.
+
+    Raises InputError naming the file, the key, the value and what is allowed.
+    """
+    data = yaml_file.load(path)
+    _validate(data, schema, str(path))
+    try:
+        return Study(
+            name=Path(path).stem,
+            question=data["question"],
+            runs={name: _planned_run(name, run) for name, run in data.get("runs", {}).items()},
+            sweep=_sweep(data["sweep"]) if "sweep" in data else None,
+            tolerances=data.get("criteria", {}),
+            figures={name: _planned_figure(name, part, data) for name, part in data.get("figures", {}).items()},
+            dpi=int(data.get("dpi", 150)),
+        )
+    except InputError as error:
+        raise error.within(str(path)) from None
+
+
+def _validate(data: object, schema: str | Path, source: str) -> None:
+    import jsonschema
+
+    validator = jsonschema.Draft202012Validator(yaml_file.load(schema))
+    errors = sorted(validator.iter_errors(data), key=lambda error: _RANK.get(str(error.validator), 1))
+    if errors:
+        raise InputError(f"{source}: {_told(errors[0])}")
+
+
+# A misspelt key is told before the key that it leaves missing.
+_RANK = {"additionalProperties": 0, "required": 2, "oneOf": 3}
+
+
+def _told(error: Any) -> str:
+    """Return a schema error as one line that names the key, its value and what is allowed."""
+    where = ".".join(str(part) for part in error.absolute_path)
+    try:
+        if error.validator == "additionalProperties":
+            checks.known_keys(where, error.instance, list(error.schema["properties"]))
+    except InputError as unknown:
+        return str(unknown)
+    if error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        return f"{where + '.' if where else ''}{missing[0]} is missing"
+    allowed = error.schema.get("errorMessage")
+    if error.validator == "oneOf":
+        return f"{where}: {allowed}"
+    return f"{where or 'the file'} = {checks.shown(error.instance)}: {allowed or error.message}"
+
+
+def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
+    planned = PlannedRun(
+        run["scene"],
+        tuple(run.get("presets", ("as_listed", "as_written"))),
+        run["model"],
+        run.get("scheme", "symplectic_euler"),
+        int(run["steps"]),
+        int(run.get("every", 1)),
+    )
+    for preset in planned.presets:
+        try:
+            scenes.load(planned.scene, preset=preset)
+        except InputError as error:
+            raise error.within(f"runs.{name}") from None
+    return planned
+
+
+def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
+    planned = PlannedFigure(figure["draw"], figure.get("run"), figure["title"])
+    if planned.draw == "frontier":
+        if "sweep" not in data:
+            raise InputError(f"figures.{name}: frontier draws a sweep, and this study has none")
+    elif planned.run not in data.get("runs", {}):
+        allowed = " or ".join(data.get("runs", {})) or "none: this study has no runs"
+        raise InputError(f"figures.{name}.run = {planned.run}: allowed is {allowed}")
+    elif planned.draw.startswith(("cube", "animation")) and data["runs"][planned.run]["model"] != "tumbling":
+        raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
+    return planned
+
+
+def _sweep(sweep: Mapping[str, Any]) -> Sweep:
+    return Sweep(
+        scenes.load(sweep["scene"], sweep.get("set", ())),
+        sweep["model"],
+        sweep.get("scheme", "symplectic_euler"),
+        tuple(sweep["contact"]),
+        sweep["stiffness"],
+        sweep.get("steps"),
+        sweep.get("omega_h"),
+        int(sweep["members"]),
+        int(sweep.get("seed", 0)),
+        int(sweep.get("cells_per_shard", 500)),
+    )
+
+
+def _geometric(span: Mapping[str, float]) -> list[float]:
+    """Return `count` values from `from` to `to`, evenly spaced in their logarithm, the ends exact.
+
+    Rounded to twelve digits: 1000, not 999.9999999999998, names a cell.
+    """
+    values = np.geomspace(span["from"], span["to"], int(span["count"]))
+    return [float(f"{value:.12g}") for value in values]

@@ -1,0 +1,58 @@
+# What the rules share: studies, read and checked once, and the paths that follow from them.
+
+import sys
+from functools import cache
+from pathlib import Path
+
+from stiffdice import study as studies
+from stiffdice.errors import InputError
+from stiffdice.provenance import code_digest
+
+SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
+
+
+wildcard_constraints:
+    study="[a-z0-9][a-z0-9-]*",
+    run="[a-z0-9][a-z0-9-]*",
+    figure="[a-z0-9][a-z0-9-]*",
+    preset="as_listed|as_written|corrected",
+    shard="[0-9a-f]{12}",
+
+
+@cache
+def study(name):
+    """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
+    try:
+        return studies.load(f"config/{name}.yaml", SCHEMA)
+    except InputError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+@cache
+def shards_of(name):
+    return study(name).sweep.shards() if study(name).sweep else {}
+
+
+def planned_run(wildcards):
+    return study(wildcards.study).runs[wildcards.run]
+
+
+def planned_figure(wildcards):
+    return study(wildcards.study).figures[wildcards.figure]
+
+
+def figure_files(name, figure):
+    """Return the files of one figure: an animation is a GIF, the others are SVG and PNG."""
+    kinds = ["gif"] if study(name).figures[figure].draw == "animation" else ["svg", "png"]
+    return [f"results/{name}/figures/{figure}.{kind}" for kind in kinds]
+
+
+def everything_of(name):
+    """Return all results of a study."""
+    planned = study(name)
+    files = [file for figure in planned.figures for file in figure_files(name, figure)]
+    files += [f"results/{name}/runs/{run}.{preset}.h5" for run in planned.runs for preset in planned.runs[run].presets]
+    if planned.sweep:
+        files += expand("results/{study}/sweep/{file}", study=name, file=["sweep.h5", "frontier.h5", "frontier.csv"])
+    return files

@@ -1,0 +1,66 @@
+# Datasets in, figures out.
+
+
+def data_of(wildcards):
+    """Return the files a figure is drawn from: a run as listed and as written, or the sweep and its frontier."""
+    planned = planned_figure(wildcards)
+    folder = f"results/{wildcards.study}"
+    if planned.run is None:
+        return {name: f"{folder}/sweep/{name}.h5" for name in ("frontier", "sweep")}
+    presets = study(wildcards.study).runs[planned.run].presets
+    return {preset: f"{folder}/runs/{planned.run}.{preset}.h5" for preset in presets}
+
+
+rule figure:
+    input:
+        unpack(data_of),
+    output:
+        report(
+            "results/{study}/figures/{figure}.svg",
+            caption="../report/figure.rst",
+            category="{study}",
+            labels={"what": "{figure}"},
+        ),
+        "results/{study}/figures/{figure}.png",
+    params:
+        figure=lambda wildcards: planned_figure(wildcards),
+        dpi=lambda wildcards: study(wildcards.study).dpi,
+        code=code_digest("stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+    log:
+        "results/{study}/logs/figure/{figure}.log",
+    benchmark:
+        "results/{study}/benchmarks/figure/{figure}.tsv"
+    resources:
+        mem_mb=700,
+        runtime=5,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/figure.py"
+
+
+rule animation:
+    input:
+        unpack(data_of),
+    output:
+        report(
+            "results/{study}/figures/{figure}.gif",
+            caption="../report/figure.rst",
+            category="{study}",
+            labels={"what": "{figure}"},
+        ),
+    params:
+        figure=lambda wildcards: planned_figure(wildcards),
+        dpi=lambda wildcards: study(wildcards.study).dpi,
+        code=code_digest("stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+    log:
+        "results/{study}/logs/figure/{figure}.log",
+    benchmark:
+        "results/{study}/benchmarks/figure/{figure}.tsv"
+    resources:
+        mem_mb=700,
+        runtime=10,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/figure.py"

@@ -1,0 +1,22 @@
+# One scene, one reading of the paper's physics, one run, one file.
+
+
+rule trajectory:
+    input:
+        scene=lambda wildcards: planned_run(wildcards).scene,
+    output:
+        "results/{study}/runs/{run}.{preset}.h5",
+    params:
+        run=lambda wildcards: planned_run(wildcards),
+        code=code_digest("stiffdice.io.layout", "stiffdice.io.write"),
+    log:
+        "results/{study}/logs/trajectory/{run}.{preset}.log",
+    benchmark:
+        "results/{study}/benchmarks/trajectory/{run}.{preset}.tsv"
+    resources:
+        mem_mb=500,
+        runtime=5,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/trajectory.py"

@@ -1,0 +1,17 @@
+"""Find the edges of stability in a collected sweep."""
+
+from typing import Any
+
+from job import logged
+
+from stiffdice import frontier
+from stiffdice.io.read import open_file
+from stiffdice.io.write import write_bytes, write_dataset
+
+snakemake: Any  # Snakemake puts it here
+
+with logged(snakemake.log[0]) as say:
+    found = frontier.find(open_file(snakemake.input[0]), snakemake.params.tolerances)
+    write_dataset(found, snakemake.output.data)
+    write_bytes(frontier.table(found).encode(), snakemake.output.table)
+    say(f"{found.sizes['stiffness']} stiffnesses, {found.sizes['criterion']} criteria")

@@ -1,0 +1,41 @@
+"""What every script does around its one call: a log, the time it took, and errors as one line."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from stiffdice.errors import StiffdiceError
+
+
+@contextmanager
+def logged(path: str) -> Iterator[Callable[[str], None]]:
+    """Write what the block says, and how it ends, to the log; a StiffdiceError ends the script with its one line."""
+    with Path(path).open("w", encoding="utf-8", buffering=1) as log:
+
+        def say(text: str) -> None:
+            log.write(text + "\n")
+
+        try:
+            yield say
+        except StiffdiceError as error:
+            say(f"failed: {error}")
+            print(f"stiffdice: {error}", file=sys.stderr)
+            sys.exit(2)
+
+
+class Stopwatch:
+    """Adds up the seconds spent in its blocks."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Count the time until the block ends."""
+        begun = time.perf_counter()
+        yield
+        self.seconds += time.perf_counter() - begun

@@ -1,0 +1,19 @@
+"""Compute the cells of one shard and store them."""
+
+from typing import Any
+
+from job import Stopwatch, logged
+
+from stiffdice import sweep
+from stiffdice.io.write import write_dataset
+
+snakemake: Any  # Snakemake puts it here
+
+with logged(snakemake.log[0]) as say:
+    watch = Stopwatch()
+    with watch.running():
+        shard = sweep.compute(
+            snakemake.params.sweep, snakemake.params.cells, lambda done: say(f"{done:.1%} of the steps done")
+        )
+    write_dataset(shard, snakemake.output[0])
+    say(f"simulation: {watch.seconds:.3f} s")

@@ -1,0 +1,21 @@
+"""Run one scene and store its trajectory."""
+
+from typing import Any
+
+from job import Stopwatch, logged
+
+from stiffdice import scene as scenes
+from stiffdice.io.layout import run_dataset
+from stiffdice.io.write import write_dataset
+from stiffdice.simulate import simulate
+
+snakemake: Any  # Snakemake puts it here
+
+planned, preset = snakemake.params.run, snakemake.wildcards.preset
+with logged(snakemake.log[0]) as say:
+    scene = scenes.load(planned.scene, preset=preset)
+    watch = Stopwatch()
+    with watch.running():
+        run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps, every=planned.every)
+    write_dataset(run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}"), snakemake.output[0])
+    say(f"simulation: {watch.seconds:.3f} s")
