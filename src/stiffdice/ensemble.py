@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from stiffdice.errors import InputError
-from stiffdice.models.state import States, rotated, start_of
 from stiffdice.scene import Scene
+from stiffdice.state import States, rotated, start_of
 
 
 def phased(scene: Scene, steps: int, count: int) -> States:

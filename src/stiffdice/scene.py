@@ -196,6 +196,8 @@ def _override(data: Any, text: str) -> Any:
     result = dict(checks.known_keys("", data or {}, ["preset", *_SECTIONS, "gravity", "duration"]))
     if len(keys) == 1:
         result[keys[0]] = yaml_file.parse(value)
+        if keys[0] in _SECTIONS:
+            checks.known_keys(keys[0], result[keys[0]], _KEYS[keys[0]])
         return result
     if keys[0] not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
         known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]

@@ -16,8 +16,8 @@ from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.errors import InputError
 from stiffdice.models import MODELS
-from stiffdice.models.state import STATE, Array, Physics, States, physics_of, start_of
 from stiffdice.scene import Scene
+from stiffdice.state import STATE, Array, Physics, States, physics_of, start_of
 from stiffdice.verdict import judge
 
 LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB

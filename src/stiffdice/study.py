@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from stiffdice import checks, theory
 from stiffdice import scene as scenes
+from stiffdice.ensemble import phased
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_file
 from stiffdice.scene import Scene
@@ -146,10 +148,20 @@ def load(path: str | Path, schema: str | Path) -> Study:
 def _validate(data: object, schema: str | Path, source: str) -> None:
     import jsonschema
 
+    _refuse_nan(data, "", source)
     validator = jsonschema.Draft202012Validator(yaml_file.load(schema))
     errors = sorted(validator.iter_errors(data), key=lambda error: _RANK.get(str(error.validator), 1))
     if errors:
         raise InputError(f"{source}: {_told(errors[0])}")
+
+
+def _refuse_nan(data: object, where: str, source: str) -> None:
+    """Raise InputError if a number is not one: no bound of a schema stops a NaN."""
+    if isinstance(data, float) and math.isnan(data):
+        raise InputError(f"{source}: {where[1:]} = nan: allowed is a finite number")
+    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, part in parts:
+        _refuse_nan(part, f"{where}.{key}", source)
 
 
 # A misspelt key is told before the key that it leaves missing.
@@ -182,6 +194,8 @@ def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
         int(run["steps"]),
         int(run.get("every", 1)),
     )
+    if planned.every > planned.steps:
+        raise InputError(f"runs.{name}.every = {planned.every}: allowed is a whole number <= steps = {planned.steps}")
     for preset in planned.presets:
         try:
             scenes.load(planned.scene, preset=preset)
@@ -204,7 +218,7 @@ def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any
 
 
 def _sweep(sweep: Mapping[str, Any]) -> Sweep:
-    return Sweep(
+    planned = Sweep(
         scenes.load(sweep["scene"], sweep.get("set", ())),
         sweep["model"],
         sweep.get("scheme", "symplectic_euler"),
@@ -216,6 +230,12 @@ def _sweep(sweep: Mapping[str, Any]) -> Sweep:
         int(sweep.get("seed", 0)),
         int(sweep.get("cells_per_shard", 500)),
     )
+    longest = min(planned.cells(), key=lambda cell: cell.steps)
+    try:
+        phased(planned.scene_of(longest), longest.steps, planned.members)
+    except InputError as error:
+        raise error.within("sweep") from None
+    return planned
 
 
 def _geometric(span: Mapping[str, float]) -> list[float]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from stiffdice.compiled import njit
 from stiffdice.measures import apex, energy, touchdown
-from stiffdice.models.state import Array, Physics
+from stiffdice.state import Array, Physics
 
 MEASURES: dict[str, Any] = {
     "touchdown_phase": touchdown,

@@ -7,7 +7,7 @@ from typing import Any
 from stiffdice.compiled import choose, chosen_by_tag
 from stiffdice.contact import Wrench
 from stiffdice.models import sliding, tumbling
-from stiffdice.models.state import Physics
+from stiffdice.state import Physics
 
 _MODULES: dict[str, Any] = {
     "sliding": sliding,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
 from stiffdice.contact import Wrench, node_force, reaches
-from stiffdice.models.state import Physics
+from stiffdice.state import Physics
 
 
 class Sliding(NamedTuple):

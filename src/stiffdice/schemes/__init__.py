@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from stiffdice.compiled import choose, chosen_by_tag
-from stiffdice.models.state import Physics
 from stiffdice.schemes import symplectic_euler
+from stiffdice.state import Physics
 
 _MODULES: dict[str, Any] = {
     "symplectic_euler": symplectic_euler,

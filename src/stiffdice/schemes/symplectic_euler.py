@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from stiffdice import models
 from stiffdice.compiled import njit
-from stiffdice.models.state import Physics
+from stiffdice.state import Physics
 
 
 class SymplecticEuler(NamedTuple):

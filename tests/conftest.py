@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from stiffdice.scene import Scene, from_mapping
+
+ROOT = Path(__file__).parent.parent
+REFERENCE = Path(__file__).parent / "reference"
+
+
+class Reference(NamedTuple):
+    scene: Scene
+    model: str
+    steps: int
+    every: int
+    table: np.ndarray  # a row for each kept step, columns by name
+    whole_run: dict  # extremes over all steps
+
+
+def read_reference(name: str) -> Reference:
+    given = json.loads((REFERENCE / f"{name}.json").read_text())
+    launch = {"position": given["x0"], "velocity": given["u0"], "angular_momentum": given.get("L0", [0, 0, 0])}
+    scene = from_mapping(
+        {
+            "cube": {"radius": given["r"], "mass": given["total_mass"]},
+            "ground": {"stiffness": given["S"], "damping": given["D"], "friction": given["mu"]},
+            "launch": launch,
+            "gravity": given["g"],
+            "duration": given["tmax"],
+        },
+        preset="as_listed",
+    )
+    model = "tumbling" if given["listing"] == "real_throw_cube" else "sliding"
+    table = np.genfromtxt(REFERENCE / f"{name}.csv", delimiter=",", names=True)
+    return Reference(scene, model, given["clockmax"], given["every_nth_step"], table, given)
+
+
+@pytest.fixture
+def reference():
+    return read_reference
+
+
+def columns(table: np.ndarray, *names: str) -> np.ndarray:
+    return np.stack([table[name] for name in names], axis=-1)
+
+
+@pytest.fixture(scope="session")
+def study_schema() -> Path:
+    return ROOT / "workflow" / "schemas" / "study.schema.yaml"

@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from stiffdice import cli
+
+ROOT = Path(__file__).parent.parent
+SCENE = str(ROOT / "config" / "scenes" / "figure-09.yaml")
+
+
+@pytest.fixture
+def stiffdice(tmp_path, monkeypatch, capsys):
+    """Run the command in an empty folder; return its status, what it printed, and the files it left."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        try:
+            status = cli.main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            status = end.code
+        out, err = capsys.readouterr()
+        return status, out, err, sorted(path.name for path in tmp_path.iterdir())
+
+    return call
+
+
+def test_run_stores_a_file_and_says_its_verdict(stiffdice):
+    status, out, err, files = stiffdice("run", SCENE, "--model", "sliding", "-o", "out.h5")
+    assert (status, err, files) == (0, "", ["out.h5"])
+    assert out == "out.h5: energy grew: the cube had more energy in the air than at the launch\n"
+    with xr.open_dataset("out.h5") as found:
+        assert found.attrs["steps"] == 10_000
+        assert found.sizes["time"] == 10_001
+
+
+def test_every_option_is_heard(stiffdice):
+    options = ["--model", "tumbling", "--scheme", "symplectic_euler", "--steps", "2e3", "--every", "4"]
+    options += ["--preset", "as_written", "--set", "ground.stiffness=1e5", "--set", "cube.mass=0.5", "-o", "out.h5"]
+    assert stiffdice("run", SCENE, *options)[0] == 0
+    with xr.open_dataset("out.h5") as found:
+        scene = json.loads(found.attrs["scene"])
+        assert (found.attrs["steps"], found.sizes["time"]) == (2000, 501)
+        assert (scene["ground"]["contact"], scene["ground"]["stiffness"], scene["cube"]["mass"]) == ("gated", 1e5, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        (["--set", "ground.stiffness=0"], "sank"),
+        (["--set", "ground.stiffness=1e16", "--steps", "10"], "blew up"),
+        (["--set", "ground.stiffness=1e308", "--set", "cube.mass=1e-9", "--steps", "10"], "left the numeric range"),
+    ],
+)
+def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
+    status, out, err, files = stiffdice("run", SCENE, *change, "-o", "out.h5")
+    assert (status, err, files) == (0, "", ["out.h5"])
+    assert out.startswith(f"out.h5: {verdict}")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["run", "nowhere.yaml", "-o", "out.h5"], "nowhere.yaml: No such file"),
+        (["run", SCENE, "-o", "nowhere/out.h5"], "the folder nowhere does not exist"),
+        (["run", SCENE, "-o", "."], "is a folder"),
+        (["run", SCENE], "required: -o"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "0"], "--steps = 0: allowed is a whole number from 1"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "-5"], "--steps = -5: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "ten"], "--steps = ten: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "nan"], "--steps = nan: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "1.5"], "--steps = 1.5: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--steps", "1e400"], "--steps = inf: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--every", "0"], "--every = 0: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--every", "10001"], "every = 10001: allowed"),
+        (["run", SCENE, "-o", "out.h5", "--model", "flying"], "model = flying: allowed is sliding or tumbling"),
+        (["run", SCENE, "-o", "out.h5", "--scheme", "magic"], "scheme = magic: allowed is symplectic_euler"),
+        (["run", SCENE, "-o", "out.h5", "--preset", "wrong"], "preset = wrong: allowed is as_listed or"),
+        (["run", SCENE, "-o", "out.h5", "--set", "ground.stifness=1"], "did you mean stiffness?"),
+        (["run", SCENE, "-o", "out.h5", "--set", "cube.mass=-1"], "cube.mass = -1: allowed is a finite number > 0"),
+        (["run", SCENE, "-o", "out.h5", "--quickly"], "unrecognized arguments: --quickly"),
+        (["fly"], "invalid choice: 'fly'"),
+        ([], "required: COMMAND"),
+        (["inspect", "nowhere.h5"], "nowhere.h5: No such file"),
+        (["inspect", SCENE], "not a readable HDF5 file"),
+    ],
+)
+def test_bad_input_is_one_line_status_2_and_nothing_written(stiffdice, arguments, told):
+    status, out, err, files = stiffdice(*arguments)
+    assert status == 2
+    assert told in err
+    assert (err.count("\n"), out, files) == (1, "", [])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["inspect", "--help"]])
+def test_help_has_examples_that_name_the_command(stiffdice, arguments):
+    status, out, _, _ = stiffdice(*arguments)
+    assert status == 0
+    assert "examples:\n  stiffdice " in out
+
+
+def test_inspect_tells_verdict_scene_and_units(stiffdice):
+    stiffdice("run", SCENE, "-o", "out.h5", "--model", "sliding")
+    status, out, err, _ = stiffdice("inspect", "out.h5")
+    assert (status, err) == (0, "")
+    for words in (
+        "energy grew",
+        "energy_ratio = 1.76663",
+        "stiffness: 1000000.0",
+        "position ",
+        "[m s-1]",
+        "ωh",
+        "steps",
+    ):
+        assert words in out.replace("omega_h", "ωh"), words
+
+
+def test_inspect_json_is_for_programs(stiffdice):
+    stiffdice("run", SCENE, "-o", "out.h5", "--model", "sliding")
+    content = json.loads(stiffdice("inspect", "out.h5", "--json")[1])
+    assert content["verdicts"] == {"energy_grew": 1}
+    assert content["attributes"]["scene"]["ground"]["stiffness"] == 1e6
+    assert content["variables"]["position"] == {"dimensions": ["time", "axis"], "units": "m"}
+
+
+def command(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "stiffdice", *arguments], capture_output=True, text=True, check=False, **options
+    )
+
+
+def test_the_same_command_gives_the_same_bytes(tmp_path):
+    for name in ("a.h5", "b.h5"):
+        assert command("run", SCENE, "-o", name, "--steps", "2000", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
+    def small_files():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+
+    environment = {"NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    import os
+
+    done = command(
+        "run", SCENE, "-o", "out.h5", cwd=tmp_path, preexec_fn=small_files, env={**os.environ, **environment}
+    )
+    assert done.returncode == 2
+    assert done.stderr == "stiffdice: out.h5: File too large; nothing was stored\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_long_run_tells_its_progress(tmp_path):
+    done = command("run", SCENE, "-o", "out.h5", "--model", "tumbling", "--steps", "4e7", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "% done, about " in done.stderr
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys; from stiffdice import cli; print([m for m in ('numpy', 'numba', 'xarray') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_readme_example_numbers(stiffdice):
+    """What `run` stores is what `simulate` returns."""
+    from stiffdice.scene import load
+    from stiffdice.simulate import simulate
+
+    stiffdice("run", SCENE, "-o", "out.h5", "--model", "sliding", "--every", "100")
+    run = simulate(load(SCENE), model="sliding", steps=10_000, every=100)
+    with xr.open_dataset("out.h5") as found:
+        np.testing.assert_array_equal(found.position, run.trajectory.state["position"])

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from stiffdice.provenance import PACKAGE, code_digest
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of the package that a test may change."""
+    target = tmp_path / "src" / "stiffdice"
+    shutil.copytree(PACKAGE, target, ignore=shutil.ignore_patterns("__pycache__"))
+    return target
+
+
+def python(copy, code, **environment):
+    path = {"PYTHONPATH": str(copy.parent)} | environment
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, **path}
+    )
+    return done.stdout.strip()
+
+
+def digest_of(copy, module):
+    return python(copy, f"from stiffdice.provenance import code_digest; print(code_digest({module!r}))")
+
+
+@pytest.mark.parametrize(
+    ("changed", "touches"),
+    [
+        ("contact.py", {"stiffdice.simulate", "stiffdice.sweep", "stiffdice.io.layout"}),
+        ("models/tumbling.py", {"stiffdice.simulate", "stiffdice.sweep", "stiffdice.io.layout"}),
+        ("ensemble.py", {"stiffdice.sweep"}),
+        ("figures/style.py", {"stiffdice.figures"}),
+        ("figures/cube.py", {"stiffdice.figures"}),
+        ("cli.py", set()),
+    ],
+)
+def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
+    modules = ("stiffdice.simulate", "stiffdice.sweep", "stiffdice.io.layout", "stiffdice.figures")
+    before = {module: digest_of(copy, module) for module in modules}
+    with (copy / changed).open("a") as file:
+        file.write("\n# changed\n")
+    after = {module: digest_of(copy, module) for module in modules}
+    assert {module for module in modules if before[module] != after[module]} == touches
+
+
+def test_digests_do_not_depend_on_where_the_code_lies(copy):
+    assert digest_of(copy, "stiffdice.sweep") == code_digest("stiffdice.sweep")
+
+
+RUN = """
+from stiffdice.scene import Scene
+from stiffdice.simulate import simulate
+print(simulate(Scene(), model="sliding", steps=1000).end["position"][0, 0])
+"""
+
+
+def test_an_edited_contact_law_is_never_served_from_the_cache(copy, tmp_path):
+    """Numba itself would not notice: the kernel that is cached lies in another file."""
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    before = python(copy, RUN, **cache)
+    assert python(copy, RUN, **cache) == before
+    law = copy / "contact.py"
+    law.write_text(law.read_text().replace("grip = physics.friction * fn", "grip = 2.0 * physics.friction * fn"))
+    after = python(copy, RUN, **cache)
+    assert float(after) < float(before)
+    assert len(list((tmp_path / "cache" / "stiffdice").iterdir())) == 2
+
+
+def test_a_home_that_cannot_be_written_is_no_hindrance(copy, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert python(copy, RUN, NUMBA_CACHE_DIR=str(blocked))

@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stiffdice.ensemble import phased
+from stiffdice.errors import InputError
+from stiffdice.scene import Scene, from_mapping
+from stiffdice.simulate import default_every, simulate
+from stiffdice.verdict import Verdict
+
+
+def verdict(steps=1000, model="sliding", **keys):
+    return Verdict(simulate(from_mapping(keys), model=model, steps=steps).verdict[0])
+
+
+@pytest.mark.parametrize(("steps", "every"), [(10_000, 7), (999, 1), (3, 2), (1, 1), (70_000, 10_000)])
+def test_time_is_a_fraction_of_the_duration_never_a_sum(steps, every):
+    run = simulate(Scene(), model="sliding", steps=steps, every=every)
+    kept = np.arange(0, steps + 1, every)
+    np.testing.assert_array_equal(run.trajectory.step, kept)
+    np.testing.assert_array_equal(run.trajectory.time, kept / steps * 10.0)
+    np.testing.assert_array_equal(run.trajectory.state["position"][0], (0, 0, 3))
+
+
+def test_samples_do_not_depend_on_how_many_are_kept():
+    all_of_them = simulate(Scene(), model="tumbling", steps=5000, every=1).trajectory.state
+    some = simulate(Scene(), model="tumbling", steps=5000, every=13).trajectory.state
+    np.testing.assert_array_equal(all_of_them[::13], some)
+
+
+def test_the_end_is_the_last_sample():
+    run = simulate(Scene(), model="tumbling", steps=5000, every=1)
+    np.testing.assert_array_equal(run.end[0], run.trajectory.state[-1])
+
+
+@pytest.mark.parametrize("every", [None, 7])
+def test_telling_progress_changes_nothing(every):
+    told: list[float] = []
+    quiet = simulate(Scene(), model="sliding", steps=300_000, every=every)
+    loud = simulate(Scene(), model="sliding", steps=300_000, every=every, progress=told.append)
+    np.testing.assert_array_equal(quiet.end, loud.end)
+    for name, value in quiet.measures.items():
+        np.testing.assert_array_equal(value, loud.measures[name])
+    if every:
+        np.testing.assert_array_equal(quiet.trajectory.state, loud.trajectory.state)
+    assert told[-1] == 1
+    assert len(told) > 1
+    assert told == sorted(told)
+
+
+def test_an_ensemble_is_its_members_one_by_one():
+    scene = Scene().with_ground(stiffness=1e5, contact="gated")
+    members = phased(scene, 3000, 5)
+    together = simulate(scene, model="sliding", steps=3000, members=members)
+    for k in range(5):
+        alone = simulate(scene, model="sliding", steps=3000, members=members[k : k + 1])
+        assert alone.end[0] == together.end[k]
+        assert alone.measures["energy_ratio"][0] == together.measures["energy_ratio"][k]
+
+
+def test_the_members_given_are_left_as_they_are():
+    members = phased(Scene(), 100, 3)
+    before = members.copy()
+    simulate(Scene(), model="tumbling", steps=100, members=members)
+    np.testing.assert_array_equal(members, before)
+
+
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+@pytest.mark.parametrize("contact", ["ungated", "gated"])
+def test_no_ground_to_speak_of(model, contact):
+    assert verdict(model=model, ground={"stiffness": 0, "contact": contact}) == Verdict.SANK
+
+
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+@pytest.mark.parametrize("contact", ["ungated", "gated"])
+def test_far_too_stiff_a_ground_is_a_run_that_blew_up(model, contact):
+    assert verdict(10, model, ground={"stiffness": 1e16, "contact": contact}) == Verdict.BLEW_UP
+
+
+def test_numbers_past_doubles_end_the_run_where_it_happens():
+    scene = from_mapping({"ground": {"stiffness": 1e308, "contact": "gated"}, "cube": {"mass": 1e-9}})
+    run = simulate(scene, model="sliding", steps=100, every=1)
+    assert Verdict(run.verdict[0]) == Verdict.LEFT_NUMERIC_RANGE
+    assert 0 < run.steps_done[0] < 100
+    assert len(run.trajectory.time) == run.steps_done[0] + 1
+    assert np.isfinite(run.trajectory.state["position"]).all()
+
+
+def test_a_soft_landing_passes():
+    assert verdict(10_000) == Verdict.PASSED
+
+
+def test_the_papers_case_of_trouble_and_its_cure():
+    stiff = {"ground": {"stiffness": 1e6}}
+    assert verdict(10_000, **stiff) == Verdict.ENERGY_GREW
+    assert verdict(20_000, **stiff) == Verdict.PASSED
+
+
+def test_a_tumbling_cube_may_rise_higher_than_before():
+    """Spin turns into height: an apex above the one before says nothing of the scheme there."""
+    keys = {"ground": {"damping": 0.1, "friction": 0.1}, "launch": {"angular_momentum": [0.3, 0.5, 0.2]}}
+    run = simulate(from_mapping(keys), model="tumbling", steps=100_000)
+    assert run.measures["apex_ratio"][0] > 1.02
+    assert Verdict(run.verdict[0]) == Verdict.PASSED
+
+
+@pytest.mark.parametrize("steps", [0, -1, 1.5, float("nan"), "many", None, True, 2**53 + 2])
+def test_steps_are_a_whole_number(steps):
+    with pytest.raises(InputError, match=r"steps = .*allowed is a whole number from 1 to 9007199254740992"):
+        simulate(Scene(), steps=steps)
+
+
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"model": "falling"}, "model = falling: allowed is sliding or tumbling"),
+        ({"scheme": "magic"}, "scheme = magic: allowed is symplectic_euler"),
+        ({"every": 0}, "every = 0"),
+        ({"every": 101}, "every = 101: allowed is a whole number from 1 to 100"),
+        ({"steps": 10**9, "every": 1}, r"would keep 1000000001 samples .* allowed is 200 or more"),
+    ],
+)
+def test_bad_choices_are_named(keys, told):
+    with pytest.raises(InputError, match=told):
+        simulate(Scene(), **{"steps": 100} | keys)
+
+
+def test_an_ensemble_keeps_no_trajectory():
+    with pytest.raises(InputError, match="not of an ensemble"):
+        simulate(Scene(), steps=100, every=1, members=phased(Scene(), 100, 2))
+
+
+@pytest.mark.parametrize(("steps", "every"), [(1, 1), (10_000, 1), (10_001, 2), (100_000, 10), (10**9, 100_000)])
+def test_the_default_keeps_at_most_ten_thousand_samples(steps, every):
+    assert default_every(steps) == every
+
+
+extremes = st.floats(-300, 300).map(lambda exponent: 10.0**exponent) | st.just(0.0)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.sampled_from(["sliding", "tumbling"]),
+    st.sampled_from(["ungated", "gated"]),
+    extremes,
+    extremes,
+    extremes,
+    st.floats(-9, 9).map(lambda exponent: 10.0**exponent),
+    st.tuples(*[st.floats(-1e6, 1e6)] * 3),
+    st.integers(1, 50),
+)
+def test_every_scene_ends_with_a_verdict(model, contact, stiffness, damping, friction, mass, spin, steps):
+    scene = from_mapping(
+        {
+            "cube": {"mass": mass},
+            "ground": {"stiffness": stiffness, "damping": damping, "friction": friction, "contact": contact},
+            "launch": {"angular_momentum": list(spin)},
+        }
+    )
+    run = simulate(scene, model=model, steps=steps, every=1)
+    assert Verdict(run.verdict[0]) in Verdict
+    assert (run.steps_done[0] < steps) == (Verdict(run.verdict[0]) == Verdict.LEFT_NUMERIC_RANGE)
+    assert np.isfinite(run.trajectory.state["position"]).all()
