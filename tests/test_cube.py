@@ -60,5 +60,5 @@ def test_bad_values_are_named(values, told):
 
 def test_a_printed_side_lost_to_round_off_is_refused():
     # -sqrt(2) + 2 sqrt(0.5 + r^2) is about sqrt(2) r^2 for a small r, and nothing at all in double precision.
-    with pytest.raises(InputError, match="no cube of this size with the printed geometry"):
+    with pytest.raises(InputError, match="no such cube with the printed geometry"):
         Cube(radius=1e-9, geometry="printed")

@@ -53,7 +53,7 @@ def test_telling_progress_changes_nothing(every):
 
 def test_an_ensemble_is_its_members_one_by_one():
     scene = Scene().with_ground(stiffness=1e5, contact="gated")
-    members = phased(scene, 3000, 5)
+    members = phased(scene, "sliding", 3000, 5)
     together = simulate(scene, model="sliding", steps=3000, members=members)
     for k in range(5):
         alone = simulate(scene, model="sliding", steps=3000, members=members[k : k + 1])
@@ -62,7 +62,7 @@ def test_an_ensemble_is_its_members_one_by_one():
 
 
 def test_the_members_given_are_left_as_they_are():
-    members = phased(Scene(), 100, 3)
+    members = phased(Scene(), "sliding", 100, 3)
     before = members.copy()
     simulate(Scene(), model="tumbling", steps=100, members=members)
     np.testing.assert_array_equal(members, before)
@@ -87,6 +87,20 @@ def test_numbers_past_doubles_end_the_run_where_it_happens():
     assert 0 < run.steps_done[0] < 100
     assert len(run.trajectory.time) == run.steps_done[0] + 1
     assert np.isfinite(run.trajectory.state["position"]).all()
+
+
+def test_a_spin_past_doubles_is_noticed():
+    keys = {
+        "cube": {"radius": 1e-10, "geometry": "exact"},
+        "ground": {"contact": "gated"},
+        "launch": {"position": [0, 0, 1e5], "angular_momentum": [1e140, 0, 0]},
+    }
+    assert verdict(model="tumbling", **keys) == Verdict.LEFT_NUMERIC_RANGE
+
+
+@pytest.mark.parametrize("gravity", [0.0, 1e300, 1e308])
+def test_extreme_gravity_is_no_warning(gravity):
+    simulate(from_mapping({"gravity": gravity}), model="sliding", steps=100, every=1)
 
 
 def test_a_soft_landing_passes():
@@ -130,7 +144,7 @@ def test_bad_choices_are_named(keys, told):
 
 def test_an_ensemble_keeps_no_trajectory():
     with pytest.raises(InputError, match="not of an ensemble"):
-        simulate(Scene(), steps=100, every=1, members=phased(Scene(), 100, 2))
+        simulate(Scene(), steps=100, every=1, members=phased(Scene(), "sliding", 100, 2))
 
 
 @pytest.mark.parametrize(("steps", "every"), [(1, 1), (10_000, 1), (10_001, 2), (100_000, 10), (10**9, 100_000)])

@@ -167,4 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # as in `stiffdice inspect FILE | head`
         sys.stderr.close()
         return 0
+    except OSError as error:  # no room for the compiled kernel, say
+        print(f"stiffdice: {error}", file=sys.stderr)
+        return 2
     return 0

@@ -48,8 +48,8 @@ class Cube:
         checks.choice("cube.inertia", self.inertia, INERTIAS)
         if not (0 < self.side < math.inf and 0 < self.moment_of_inertia < math.inf):
             raise InputError(
-                f"cube.radius = {self.radius:g} m: double precision has no cube of this size with the "
-                f"{self.geometry} geometry (side {self.side:g} m, inertia {self.moment_of_inertia:g} kg m²)"
+                f"cube.radius = {self.radius:g}, cube.mass = {self.mass:g}: double precision has no such cube with "
+                f"the {self.geometry} geometry (side {self.side:g} m, inertia {self.moment_of_inertia:g} kg m²)"
             )
 
     @property

@@ -13,19 +13,19 @@ from stiffdice.scene import Scene
 from stiffdice.state import States, rotated, start_of
 
 
-def phased(scene: Scene, steps: int, count: int) -> States:
+def phased(scene: Scene, model: str, steps: int, count: int) -> States:
     """Return `count` launches, shape (count,), the k-th being k/count of a time step along the scene's flight.
 
     The flight is the free one, gravity alone. (The `ungated` law drags on a falling cube, too: a scene that launches
     downwards gets members whose energies differ by that drag over less than a step.)
     Raises InputError if the cube is not clear of the ground from the launch on for a whole step.
     """
-    members = np.repeat(start_of(scene), count)
+    members = np.repeat(start_of(scene, model), count)
     if count == 1:
         return members
     delay = np.arange(count) / count * (scene.duration / steps)
     down = np.array([0.0, 0.0, -scene.gravity])
-    start = start_of(scene)[0]
+    start = start_of(scene, model)[0]
     members["position"] += start["velocity"] * delay[:, None] + 0.5 * down * delay[:, None] ** 2
     members["velocity"] += down * delay[:, None]
     spin = start["angular_momentum"] / scene.cube.moment_of_inertia

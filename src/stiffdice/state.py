@@ -70,15 +70,16 @@ def physics_of(scene: Scene) -> Physics:
     )
 
 
-def start_of(scene: Scene) -> States:
-    """Return the state at the launch, shape (1,)."""
+def start_of(scene: Scene, model: str) -> States:
+    """Return the state at the launch, shape (1,); a model that does not turn the cube leaves its spin out."""
     launch = scene.launch
     state = np.zeros(1, STATE)
     state["position"] = launch.position
     state["velocity"] = launch.velocity
-    state["angular_momentum"] = launch.spin
-    if launch.node_velocity == "rigid":
-        state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
+    if model == "tumbling":
+        state["angular_momentum"] = launch.spin
+        if launch.node_velocity == "rigid":
+            state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
     state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
     return state
 

@@ -28,9 +28,11 @@ class Cell(NamedTuple):
     steps: int
 
 
-@dataclass(frozen=True)
-class PlannedRun:
-    """One scene to be run, once for each reading of the paper's physics."""
+class PlannedRun(NamedTuple):
+    """One scene to be run, once for each reading of the paper's physics.
+
+    A tuple, as PlannedFigure: Snakemake notices a changed parameter only if it is plain data.
+    """
 
     scene: str
     presets: tuple[str, ...]
@@ -64,7 +66,7 @@ class Sweep:
         return [
             Cell(contact, stiffness, steps)
             for contact in self.contact
-            for stiffness in _geometric(self.stiffness)
+            for stiffness in dict.fromkeys(_geometric(self.stiffness))
             for steps in self._steps_of(stiffness)
         ]
 
@@ -102,8 +104,7 @@ class Sweep:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
-@dataclass(frozen=True)
-class PlannedFigure:
+class PlannedFigure(NamedTuple):
     """One figure: what to draw (a name of `figures.DRAWINGS`), of which run (none for the sweep's)."""
 
     draw: str
@@ -232,7 +233,7 @@ def _sweep(sweep: Mapping[str, Any]) -> Sweep:
     )
     longest = min(planned.cells(), key=lambda cell: cell.steps)
     try:
-        phased(planned.scene_of(longest), longest.steps, planned.members)
+        phased(planned.scene_of(longest), planned.model, longest.steps, planned.members)
     except InputError as error:
         raise error.within("sweep") from None
     return planned

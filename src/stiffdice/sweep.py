@@ -33,7 +33,7 @@ def compute(sweep: Sweep, cells: Sequence[Cell], progress: Callable[[float], Non
 
 def _run(sweep: Sweep, cell: Cell) -> Run:
     scene = sweep.scene_of(cell)
-    members = phased(scene, cell.steps, sweep.members)
+    members = phased(scene, sweep.model, cell.steps, sweep.members)
     return simulate(scene, model=sweep.model, scheme=sweep.scheme, steps=cell.steps, members=members)
 
 

@@ -62,6 +62,35 @@ def test_apex_ratio_compares_each_flight_with_the_one_before():
     assert run.measures["apex_ratio"][0] == pytest.approx((apexes[1:] / apexes[:-1]).max(), rel=1e-4)
 
 
+def test_a_flight_that_never_tops_out_counts_with_the_top_it_is_bound_for():
+    """At ωh = 6.3 the first bounce throws the cube so high that it is still rising at the end."""
+    scene = from_mapping({"ground": {"stiffness": 1e7}})
+    run = simulate(scene, model="sliding", steps=10_000, every=1)
+    kept = run.trajectory
+    z, w = kept.state["position"][-1, 2], kept.state["velocity"][-1, 2]
+    assert w > 0
+    first = kept.state["position"][:1500, 2].max()
+    assert run.measures["apex_ratio"][0] == pytest.approx((z + w**2 / 19.6) / first, rel=1e-3)
+    assert run.measures["apex_ratio"][0] > 100
+
+
+def test_a_launch_pressed_into_the_ground_may_rise_by_what_its_springs_hold():
+    pressed = {"position": [0, 0, 0.5], "velocity": [0, 0, 0]}
+    assert measured("apex_ratio", 200_000, ground=GATED | {"damping": 0}, launch=pressed) == pytest.approx(1, abs=2e-3)
+
+
+@pytest.mark.parametrize("velocity", [[0, 0, -10], [0, 0, 0], [0, 0, 5]])
+@pytest.mark.parametrize("steps", [60, 100, 1000])
+def test_coarse_steps_make_no_apex_rise_by_themselves(velocity, steps):
+    """A flight is measured against the same scheme's flight from the launch, at a magic step: no bounce gains."""
+    omega_h = 1.0
+    duration = 4.0
+    stiffness = (omega_h * steps / duration) ** 2 / 4
+    launch = {"position": [0, 0, 30], "velocity": velocity}
+    keys = {"ground": GATED | {"damping": 0, "stiffness": stiffness}, "launch": launch, "duration": duration}
+    assert measured("apex_ratio", steps, **keys) <= 1.02
+
+
 def test_no_flight_no_apex():
     lying = {"position": [0, 0, 0.5], "velocity": [0, 0, 0]}
     assert measured("apex_ratio", ground=GATED | {"damping": 10, "stiffness": 100}, launch=lying) == 0
@@ -72,7 +101,7 @@ def test_no_flight_no_apex():
 def test_members_touch_down_at_evenly_spread_phases(contact, steps):
     scene = Scene().with_ground(contact=contact)
     count = 16
-    run = simulate(scene, model="sliding", steps=steps, members=phased(scene, steps, count))
+    run = simulate(scene, model="sliding", steps=steps, members=phased(scene, "sliding", steps, count))
     phase = np.sort(run.measures["touchdown_phase"])
     gaps = np.diff(np.append(phase, phase[0] + 1))
     np.testing.assert_allclose(gaps, 1 / count, rtol=0.2)
@@ -80,6 +109,15 @@ def test_members_touch_down_at_evenly_spread_phases(contact, steps):
 
 def test_no_touch_down_no_phase():
     assert np.isnan(measured("touchdown_phase", duration=0.5))
+
+
+@pytest.mark.parametrize("z", [1.0, 2.0, 3.0])
+def test_phase_is_exact_at_the_coarsest_steps(z):
+    keys = {"ground": GATED, "launch": {"position": [0, 0, z], "velocity": [0, 0, 0]}}
+    lowest = z - 1.0352761804100830 / 2 - 9.8 * np.array([0, 1, 3, 6, 10])  # h = 1 s
+    first = np.flatnonzero(lowest <= 0)[0]
+    expected = lowest[first - 1] / (lowest[first - 1] - lowest[first])
+    assert measured("touchdown_phase", 10, **keys) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])

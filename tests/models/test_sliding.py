@@ -85,4 +85,4 @@ def test_spin_is_left_out(contact):
     still = from_mapping({"ground": {"contact": contact}})
     a, b = (simulate(s, model="sliding", steps=3000, every=100).trajectory for s in (scene, still))
     np.testing.assert_array_equal(a.state["position"], b.state["position"])
-    np.testing.assert_array_equal(a.energy_full, b.energy_full)
+    np.testing.assert_array_equal(a.energy_paper, b.energy_paper)

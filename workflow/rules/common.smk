@@ -48,6 +48,16 @@ def figure_files(name, figure):
     return [f"results/{name}/figures/{figure}.{kind}" for kind in kinds]
 
 
+def data_of(wildcards):
+    """Return the files a figure is drawn from: a run as listed and as written, or the sweep and its frontier."""
+    planned = planned_figure(wildcards)
+    folder = f"results/{wildcards.study}"
+    if planned.run is None:
+        return {name: f"{folder}/sweep/{name}.h5" for name in ("frontier", "sweep")}
+    presets = study(wildcards.study).runs[planned.run].presets
+    return {preset: f"{folder}/runs/{planned.run}.{preset}.h5" for preset in presets}
+
+
 def everything_of(name):
     """Return all results of a study."""
     planned = study(name)

@@ -6,6 +6,7 @@ rule shard:
     output:
         "results/{study}/sweep/shards/{shard}.h5",
     params:
+        # Snakemake compares plain data only; that `sweep` changed it learns from the shard's name.
         sweep=lambda wildcards: study(wildcards.study).sweep,
         cells=lambda wildcards: shards_of(wildcards.study)[wildcards.shard],
         code=code_digest("stiffdice.sweep", "stiffdice.io.write"),

@@ -43,7 +43,8 @@ def clearance_of(physics: Physics, state: Any, height: float, h: float) -> float
     far = height - physics.reach
     if far > 0.0:
         speed = physics.nx * state.velocity[0] + physics.ny * state.velocity[1] + physics.nz * state.velocity[2]
-        if far > 2 * h * abs(speed):
+        # Farther than it can fall in the next step, so that the step in which it touches down starts exact.
+        if far > 2 * h * (abs(speed) + h * physics.gravity):
             return far
     lowest = physics.reach
     nodes = state.node_offset
@@ -53,13 +54,25 @@ def clearance_of(physics: Physics, state: Any, height: float, h: float) -> float
 
 
 @njit
+def elastic_of(physics: Physics, state: Any, height: float) -> float:
+    """Return the energy in the ground's springs [J], S d²/2 for each node below the ground."""
+    energy = 0.0
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        depth = -(height + physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2])
+        energy += 0.5 * physics.stiffness * max(0.0, depth) ** 2
+    return energy
+
+
+@njit
 def start(memory: Any, physics: Physics, state: Any, h: float) -> None:
     """Begin to watch a run that stands at its launch."""
     height = height_of(physics, state)
     clearance = clearance_of(physics, state, height, h)
-    touchdown.start(memory.touchdown_phase, physics, state, height, clearance)
-    energy.start(memory.energy_ratio, physics, state, height, clearance)
-    apex.start(memory.apex_ratio, physics, state, height, clearance)
+    elastic = elastic_of(physics, state, height)
+    touchdown.start(memory.touchdown_phase, clearance)
+    energy.start(memory.energy_ratio, physics, state, height, clearance, elastic)
+    apex.start(memory.apex_ratio, physics, state, height, clearance, elastic, h)
 
 
 @njit
@@ -67,6 +80,6 @@ def observe(memory: Any, physics: Physics, state: Any, h: float) -> None:
     """Look at the state after a step of h [s]."""
     height = height_of(physics, state)
     clearance = clearance_of(physics, state, height, h)
-    touchdown.observe(memory.touchdown_phase, physics, state, height, clearance)
-    energy.observe(memory.energy_ratio, physics, state, height, clearance)
-    apex.observe(memory.apex_ratio, physics, state, height, clearance)
+    touchdown.observe(memory.touchdown_phase, clearance)
+    energy.observe(memory.energy_ratio, physics, state, clearance)
+    apex.observe(memory.apex_ratio, height, clearance)

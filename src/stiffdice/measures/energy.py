@@ -1,6 +1,9 @@
 """The most energy the cube ever has in the air, against what it started with.
 
 In the air the springs hold nothing, so kinetic energy + m g z is all there is, and neither contact law can add to it.
+It is taken at the steps, as the paper plots it. There a rising cube reads m g h v more than a falling one at the same
+height (symplectic Euler keeps E − m g h v/2 in free flight), so that at coarse steps a launch at rest or downwards
+seems to gain.
 """
 
 from __future__ import annotations
@@ -15,13 +18,8 @@ SLOTS = 3  # energy at launch [J], what one is measured by [J], largest ratio so
 
 
 @njit
-def start(memory: Any, physics: Any, state: Any, height: float, clearance: float) -> None:
+def start(memory: Any, physics: Any, state: Any, height: float, clearance: float, elastic: float) -> None:
     """Begin to watch a run that stands at its launch."""
-    elastic = 0.0
-    for k in range(state.node_offset.shape[0]):
-        x, y, z = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-        depth = max(0.0, -(height + physics.nx * x + physics.ny * y + physics.nz * z))
-        elastic += 0.5 * physics.stiffness * depth * depth
     moving = _kinetic(physics, state)
     memory[0] = moving + physics.mass * physics.gravity * state.position[2] + elastic
     # On flat ground this is the energy at launch; on a slope, where the zero of m g z means nothing, it is
@@ -33,7 +31,7 @@ def start(memory: Any, physics: Any, state: Any, height: float, clearance: float
 
 
 @njit
-def observe(memory: Any, physics: Any, state: Any, height: float, clearance: float) -> None:
+def observe(memory: Any, physics: Any, state: Any, clearance: float) -> None:
     """Look at the state after a step."""
     if clearance > 0.0:
         energy = _kinetic(physics, state) + physics.mass * physics.gravity * state.position[2]

@@ -15,14 +15,14 @@ SLOTS = 2  # clearance one step ago, phase
 
 
 @njit
-def start(memory: Any, physics: Any, state: Any, height: float, clearance: float) -> None:
+def start(memory: Any, clearance: float) -> None:
     """Begin to watch a run that stands at its launch."""
     memory[0] = clearance
     memory[1] = math.nan
 
 
 @njit
-def observe(memory: Any, physics: Any, state: Any, height: float, clearance: float) -> None:
+def observe(memory: Any, clearance: float) -> None:
     """Look at the state after a step."""
     if clearance <= 0.0 and memory[0] > 0.0 and math.isnan(memory[1]):
         memory[1] = memory[0] / (memory[0] - clearance)

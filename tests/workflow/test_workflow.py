@@ -1,0 +1,278 @@
+"""The whole pipeline on a tiny study, as a user runs it, in a copy of the project."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+from PIL import Image
+
+from stiffdice import study as studies
+from stiffdice import sweep
+from stiffdice.io.read import open_file
+from stiffdice.scene import load
+from stiffdice.simulate import simulate
+
+ROOT = Path(__file__).parent.parent.parent
+TINY = {
+    "question": "Does all of it work?",
+    "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10}},
+    "sweep": {
+        "scene": "config/scenes/figure-13.yaml",
+        "model": "sliding",
+        "contact": ["ungated", "gated"],
+        "stiffness": {"from": 1e3, "to": 1e5, "count": 3},
+        "omega_h": {"from": 3.0, "to": 0.3, "count": 12},
+        "members": 4,
+        "cells_per_shard": 30,
+    },
+    "figures": {
+        "position": {"draw": "position", "run": "stiff", "title": "Position"},
+        "frontier": {"draw": "frontier", "title": "Frontier"},
+    },
+}
+pytestmark = pytest.mark.workflow
+
+
+class Project:
+    """A copy of the project whose files a test may change."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        for name in ("workflow", "config", "src"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copy(ROOT / "Snakefile", folder)
+        (folder / "profiles").symlink_to("workflow/profiles")
+        (folder / "results").mkdir()
+        self.plan(TINY)
+
+    def plan(self, study: dict) -> None:
+        (self.folder / "config" / "tiny.yaml").write_text(yaml.safe_dump(study))
+
+    def command(self, *arguments: str) -> list[str]:
+        return [sys.executable, "-m", "snakemake", "study", *arguments, "--config", "study=tiny"]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        # A proxy that is not there: whatever asks the network fails.
+        away = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
+        return {**os.environ, **away, "PYTHONPATH": str(self.folder / "src")}
+
+    def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(*arguments),
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    def jobs_due(self) -> dict[str, int]:
+        """Return what a dry run would do: rules and how many jobs of each."""
+        done = self.snakemake("-n")
+        assert done.returncode == 0, done.stderr
+        listed = re.search(r"^job +count\n-+ +-+\n(.*?)^total", done.stdout + done.stderr, re.MULTILINE | re.DOTALL)
+        rows = [line.split() for line in listed[1].splitlines()] if listed else []
+        return {rule: int(count) for rule, count in rows if rule != "study"}
+
+    def results(self, *patterns: str) -> dict[str, bytes]:
+        top = self.folder / "results" / "tiny"
+        return {
+            str(path.relative_to(top)): path.read_bytes() for pattern in patterns for path in sorted(top.glob(pattern))
+        }
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A project whose study has run; tests that change it take their changes back."""
+    project = Project(tmp_path_factory.mktemp("finished"))
+    done = project.snakemake()
+    assert done.returncode == 0, done.stderr
+    return project
+
+
+@pytest.fixture
+def edited(finished):
+    """Change a file of the finished project for one test."""
+    kept: dict[Path, tuple[bytes, os.stat_result]] = {}
+
+    def edit(name: str, change) -> None:
+        path = finished.folder / name
+        kept[path] = (path.read_bytes(), path.stat())
+        path.write_text(change(path.read_text()))
+
+    yield edit
+    for path, (content, stat) in kept.items():
+        path.write_bytes(content)
+        os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+
+
+def planned(project: Project) -> studies.Study:
+    return studies.load(project.folder / "config/tiny.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+
+
+def test_all_files_are_there_and_open(finished):
+    top = finished.folder / "results" / "tiny"
+    for name in ("position", "frontier"):
+        with Image.open(top / "figures" / f"{name}.png") as image:
+            image.load()
+            assert min(image.size) > 300
+        assert "<svg" in (top / "figures" / f"{name}.svg").read_text()
+    hdf5 = sorted(top.rglob("*.h5"))
+    assert len(hdf5) == 2 + 3 + 2  # runs, shards, sweep and frontier
+    for path in hdf5:
+        with xr.open_dataset(path) as found:
+            assert found.attrs["format_version"] == "1.0"
+    assert {path.stem for path in (top / "benchmarks").rglob("*.tsv")} >= {"collect", "frontier", "stiff.as_listed"}
+
+
+@pytest.mark.parametrize("preset", ["as_listed", "as_written"])
+def test_a_stored_run_is_what_the_simulator_says(finished, preset):
+    found = open_file(finished.folder / f"results/tiny/runs/stiff.{preset}.h5")
+    run = simulate(load(ROOT / "config/scenes/figure-09.yaml", preset=preset), model="sliding", steps=10_000, every=10)
+    np.testing.assert_array_equal(found.position, run.trajectory.state["position"])
+    assert found.attrs["model"] == "sliding"
+    energy = {"as_listed": 96.10474204235116, "as_written": 222.30}
+    assert float(found.energy_paper.max()) == pytest.approx(energy[preset], rel=1e-3)
+
+
+def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished):
+    plan = planned(finished).sweep
+    whole = sweep.collect([sweep.compute(plan, plan.cells())])
+    xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweep/sweep.h5"), whole)
+
+
+def test_the_table_says_what_the_file_says(finished):
+    found = open_file(finished.folder / "results/tiny/sweep/frontier.h5")
+    with (finished.folder / "results/tiny/sweep/frontier.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 2 * 3
+    assert [float(row["first_pass"]) for row in rows] == found.first_pass.values.ravel().tolist()
+    assert [float(row["last_fail"]) for row in rows] == found.last_fail.values.ravel().tolist()
+
+
+def test_a_table_maps_the_shards_names_back(finished):
+    with (finished.folder / "results/tiny/sweep/shards.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["shard"] for row in rows} == set(planned(finished).sweep.shards())
+    assert sum(int(row["cells"]) for row in rows) == len(planned(finished).sweep.cells())
+
+
+def test_a_rerun_with_nothing_changed_does_nothing(finished):
+    before = {path: path.stat().st_mtime_ns for path in (finished.folder / "results").rglob("*")}
+    done = finished.snakemake()
+    assert done.returncode == 0
+    assert "Nothing to be done" in done.stdout + done.stderr
+    assert before == {path: path.stat().st_mtime_ns for path in (finished.folder / "results").rglob("*")}
+
+
+def test_a_changed_style_redraws_only(finished, edited):
+    edited("src/stiffdice/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
+    assert finished.jobs_due() == {"figure": 2}
+
+
+def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
+    edited("src/stiffdice/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
+    assert finished.jobs_due() == {"shard": 3, "trajectory": 2, "collect": 1, "frontier": 1, "figure": 2}
+
+
+def test_a_changed_analysis_computes_no_run_again(finished, edited):
+    edited("src/stiffdice/frontier.py", lambda text: text + "\n")
+    assert finished.jobs_due() == {"frontier": 1, "figure": 1}
+
+
+def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
+    edited("config/tiny.yaml", lambda text: text + "criteria: {apex: 0.5}\n")
+    assert finished.jobs_due() == {"frontier": 1, "figure": 1}
+
+
+def test_a_changed_title_redraws_its_figure(finished, edited):
+    edited("config/tiny.yaml", lambda text: text.replace("title: Position", "title: Place"))
+    assert finished.jobs_due() == {"figure": 1}
+
+
+def test_another_grid_is_computed(finished, edited):
+    edited("config/tiny.yaml", lambda text: text.replace("members: 4", "members: 5"))
+    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+
+
+def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
+    edited("config/tiny.yaml", lambda text: text.replace("members: 4", "members: none"))
+    done = finished.snakemake()
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("Using workflow specific profile")]
+    assert lines == ["stiffdice: config/tiny.yaml: sweep.members = none: allowed is a whole number from 1 to 1000000"]
+
+
+def test_the_report_works_without_a_network(finished):
+    done = finished.snakemake("--report", "report.html")
+    assert done.returncode == 0, done.stderr
+    text = (finished.folder / "report.html").read_text()
+    assert "Frontier" in text
+    assert "first pass" in text
+
+
+def test_lint_finds_nothing(finished):
+    done = subprocess.run(
+        [sys.executable, "-m", "snakemake", "--lint"], cwd=finished.folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_shard_size_and_order_change_no_number(finished, tmp_path):
+    other = Project(tmp_path)
+    other.plan({**TINY, "sweep": {**TINY["sweep"], "cells_per_shard": 11}})
+    done = other.snakemake("--cores", "1")
+    assert done.returncode == 0, done.stderr
+    data = ("sweep/sweep.h5", "sweep/frontier.*", "runs/*.h5", "figures/*")
+    assert other.results(*data) == finished.results(*data)
+
+
+def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
+    """kill -9 to Snakemake and all its jobs, at the moment the first shard is there."""
+    project = Project(tmp_path)
+    running = subprocess.Popen(
+        project.command(),
+        cwd=project.folder,
+        env=project.environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 120
+    while not project.results("sweep/shards/*.h5"):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    os.killpg(running.pid, signal.SIGKILL)
+    running.wait()
+    assert project.jobs_due()
+    done = project.snakemake()
+    assert done.returncode == 0, done.stderr
+    data = ("**/*.h5", "sweep/*.csv", "figures/*")
+    assert project.results(*data) == finished.results(*data)
+
+
+def test_where_the_time_went_is_told(finished):
+    done = subprocess.run(
+        [sys.executable, "workflow/run.py", "--cores", "2", "study", "--forcerun", "collect", "--config", "study=tiny"],
+        cwd=finished.folder,
+        env=finished.environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
+    assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
