@@ -44,6 +44,7 @@ lock: $(READY)  ## renew the lock files from requirements/*.in (needs uv on the 
 	  uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
 	    --no-emit-index-url --custom-compile-command "make lock" \
 	    requirements/$$name.in -o requirements/$$name.lock; done
+	@$(BIN)/python requirements/write_conda_env.py
 
 clean:  ## remove results (keeps .venv)
 	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -r {} + ; rm -rf .snakemake

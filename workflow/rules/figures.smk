@@ -44,9 +44,9 @@ rule animation:
         dpi=lambda wildcards: study(wildcards.study).dpi,
         code=code_digest("stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
     log:
-        "results/{study}/logs/figure/{figure}.log",
+        "results/{study}/logs/animation/{figure}.log",
     benchmark:
-        "results/{study}/benchmarks/figure/{figure}.tsv"
+        "results/{study}/benchmarks/animation/{figure}.tsv"
     resources:
         mem_mb=700,
         runtime=10,

@@ -8,6 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+# The library of this checkout, installed or not: the one whose digest the workflow computed.
+sys.path.insert(0, str(Path(__file__).parents[2] / "src"))
+
 from stiffdice.errors import StiffdiceError
 
 
