@@ -1,0 +1,84 @@
+"""What the documentation says is so: its commands run, its links lead somewhere, its tables name what there is."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+import yaml
+
+from stiffdice.figures import DRAWINGS
+from stiffdice.scene import PRESETS, Scene
+
+ROOT = Path(__file__).parent.parent
+PAGES = ["README.md", "config/README.md", "results/README.md", "docs/method.md", "CHANGELOG.md"]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page):
+    text = (ROOT / page).read_text()
+    for target in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (ROOT / page).parent.joinpath(target).exists(), target
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+
+
+def test_a_cube_of_ones_own_is_thrown_as_the_readme_says(tmp_path, monkeypatch):
+    (own,) = (block for block in blocks("README.md", "sh") if "my-cube.yaml" in block)
+    command = own.replace("make install\n", "").replace(".venv/bin/stiffdice", f"{sys.executable} -m stiffdice")
+    done = subprocess.run(["bash", "-ec", command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "my-cube.h5: passed" in done.stdout
+    mpl.use("agg")
+    monkeypatch.chdir(tmp_path)
+    (python,) = blocks("README.md", "python")
+    exec(python, {})
+
+
+def table_keys(page: str, heading: str) -> list[tuple[str, ...]]:
+    text = (ROOT / page).read_text().partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    return [tuple(re.split(r"\s*\|\s*", line.strip("| "))) for line in text.splitlines() if line.startswith("| `")]
+
+
+def test_the_table_of_scene_keys_has_every_key_and_its_default():
+    plain = Scene().as_mapping()
+    expected = {key: plain[key] for key in ("gravity", "duration")}
+    for section in ("cube", "ground", "launch"):
+        expected |= {f"{section}.{key}": value for key, value in plain[section].items()}
+    told = {}
+    for row in table_keys("config/README.md", "Scene"):
+        key = re.match(r"`([\w.]+)`", row[0])[1]
+        if key in PRESETS or key == "preset":
+            continue
+        told[key] = yaml.safe_load(row[2].strip("`").replace("e4", "e+4"))
+    assert told == expected
+
+
+def test_the_table_of_study_keys_has_every_key():
+    schema = yaml.safe_load((ROOT / "workflow/schemas/study.schema.yaml").read_text())
+    told = " ".join(row[0] for row in table_keys("config/README.md", "Study"))
+    kinds = schema["$defs"]
+    keys = [*schema["properties"], *kinds["sweep"]["properties"], *kinds["run"]["properties"]]
+    keys += [*schema["properties"]["criteria"]["properties"]]
+    keys += [*schema["properties"]["figures"]["additionalProperties"]["properties"]]
+    for key in keys:
+        assert re.search(rf"[`.]{key}[`.]", told), key
+
+
+def test_every_drawing_is_named():
+    text = (ROOT / "config/README.md").read_text()
+    assert all(f"`{name}`" in text for name in DRAWINGS)
+
+
+def test_make_targets_of_the_readme_exist():
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = {name for block in blocks("README.md", "sh") for name in re.findall(r"^make ([a-z]+)", block, re.MULTILINE)}
+    named |= set(re.findall(r"`make ([a-z]+)", (ROOT / "README.md").read_text()))
+    assert named
+    assert named <= targets
