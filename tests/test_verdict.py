@@ -22,7 +22,7 @@ def judged(model="sliding", energy=1.0, apex=1.0, finite=True, sunk=False):
         ({"apex": 2, "energy": 2, "sunk": True}, Verdict.SANK),
         ({"energy": 1001, "sunk": True}, Verdict.BLEW_UP),
         ({"energy": np.inf}, Verdict.BLEW_UP),
-        ({"energy": np.nan}, Verdict.BLEW_UP),
+        ({"energy": np.nan}, Verdict.LEFT_NUMERIC_RANGE),
         ({"finite": False}, Verdict.LEFT_NUMERIC_RANGE),
         ({"apex": 2, "model": "tumbling"}, Verdict.PASSED),
         ({"energy": 2, "model": "tumbling"}, Verdict.ENERGY_GREW),

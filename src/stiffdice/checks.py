@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import numbers
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -31,7 +32,7 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
     if unit:
         allowed += f" [{unit}]"
     try:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise ValueError
         result = float(value)
     except (ValueError, OverflowError):
@@ -48,10 +49,8 @@ def count(key: str, value: object, *, at_least: int = 1, at_most: int = 2**53) -
 
     Raises InputError otherwise. Above 2^53 neighbouring step numbers share one double.
     """
-    whole = (isinstance(value, int) and not isinstance(value, bool)) or (
-        isinstance(value, float) and value.is_integer()
-    )
-    if not whole or not at_least <= value <= at_most:  # type: ignore[operator]
+    whole = isinstance(value, numbers.Integral) or (isinstance(value, float) and value.is_integer())
+    if isinstance(value, bool) or not whole or not at_least <= value <= at_most:  # type: ignore[operator]
         raise InputError(f"{key} = {shown(value)}: allowed is a whole number from {at_least} to {at_most}")
     return int(value)  # type: ignore[call-overload]
 

@@ -167,6 +167,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # as in `stiffdice inspect FILE | head`
         sys.stderr.close()
         return 0
+    except MemoryError:
+        print("stiffdice: not enough memory; keep fewer samples with a larger --every", file=sys.stderr)
+        return 2
     except OSError as error:  # no room for the compiled kernel, say
         print(f"stiffdice: {error}", file=sys.stderr)
         return 2

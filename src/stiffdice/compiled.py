@@ -2,7 +2,7 @@
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
-versions that compile them. This module must be imported before numba is.
+versions that compile them.
 """
 
 from __future__ import annotations
@@ -45,24 +45,35 @@ def _cpu() -> str:
     return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features"))}))
 
 
-os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())
+# In the environment for child processes and for numba to find when it reads it again; in its configuration in case
+# that somebody imported numba before.
+_FOLDER = str(_cache_folder())
+os.environ["NUMBA_CACHE_DIR"] = _FOLDER
 
+import numba  # noqa: E402
 from numba import njit  # noqa: E402
 from numba.extending import overload  # noqa: E402
 
-__all__ = ["choose", "chosen_by_tag", "njit"]
+setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
+
+__all__ = ["by_tag", "njit"]
 
 
-def chosen_by_tag(stub: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorate what picks the compiled body of `stub` from a registry, by the type of a tag.
+def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:
+    """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
-    A tag is an empty named tuple that stands for a contact law, a model or a scheme. The choice is made at compile
-    time and costs nothing in a loop; unlike functions passed as arguments it leaves the kernel cacheable on disk, and
-    unlike string literals it does not slow down every call of the kernel (1 µs against 11 ms, numba 0.68).
+    The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body is
+    chosen at compile time, which costs nothing in a loop; unlike functions passed as arguments it leaves the kernel
+    cacheable on disk, and unlike string literals it does not slow down every call of the kernel (1 µs against 11 ms,
+    numba 0.68). The body gets the arguments after the tag.
     """
-    return overload(stub, strict=False)
 
+    def call(tag: Any, *arguments: Any) -> Any:
+        raise NotImplementedError("compiled code only")
 
-def choose(registry: dict[type, Any], tag: Any) -> Any:
-    """Return the entry of a tag's class, from the numba type of the tag."""
-    return registry[tag.instance_class]
+    @overload(call, strict=False)
+    def _choose(tag: Any, *arguments: Any) -> Any:
+        body = bodies[tag.instance_class]
+        return lambda tag, *arguments: body(*arguments)
+
+    return call

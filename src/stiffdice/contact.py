@@ -1,7 +1,6 @@
 """What the ground does to one node: the normal force by contact law, and friction (paper, section 4.2).
 
-A contact law is a tag and two compiled functions: `normal_force`, and `reaches`, which says whether the law can act
-at all on a body whose every node is at least `clearance` above the ground.
+A contact law is a tag and two compiled functions, chosen by it.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stiffdice.compiled import choose, chosen_by_tag, njit
+from stiffdice.compiled import by_tag, njit
 
 # (fx, fy, fz, torque_x, torque_y, torque_z)
 Wrench = tuple[float, float, float, float, float, float]
@@ -50,33 +49,12 @@ def _gated_reaches(clearance: float) -> bool:
     return clearance <= 0.0
 
 
-_NORMAL_FORCES: dict[type, Any] = {Ungated: _ungated_force, Gated: _gated_force}
-_REACHES: dict[type, Any] = {Ungated: _ungated_reaches, Gated: _gated_reaches}
+# (law, depth, speed, stiffness, damping) -> the magnitude of the normal force on a node [N]. depth [m]: distance below
+# the ground, negative above it. speed [m/s]: along the outward normal.
+normal_force = by_tag({Ungated: _ungated_force, Gated: _gated_force})
 
-
-def normal_force(law: Any, depth: float, speed: float, stiffness: float, damping: float) -> float:
-    """Return the magnitude of the normal force on a node [N]; compiled code only.
-
-    depth [m]: distance below the ground, negative above it. speed [m/s]: along the outward normal.
-    """
-    return _NORMAL_FORCES[type(law)](depth, speed, stiffness, damping)
-
-
-@chosen_by_tag(normal_force)
-def _normal_force(law: Any, depth: Any, speed: Any, stiffness: Any, damping: Any) -> Any:
-    chosen = choose(_NORMAL_FORCES, law)
-    return lambda law, depth, speed, stiffness, damping: chosen(depth, speed, stiffness, damping)
-
-
-def reaches(law: Any, clearance: float) -> bool:
-    """Return whether the law can act on a body with this clearance [m]; compiled code only."""
-    return _REACHES[type(law)](clearance)
-
-
-@chosen_by_tag(reaches)
-def _reaches(law: Any, clearance: Any) -> Any:
-    chosen = choose(_REACHES, law)
-    return lambda law, clearance: chosen(clearance)
+# (law, clearance) -> whether the law can act on a body whose every node is at least `clearance` [m] above the ground.
+reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})
 
 
 @njit

@@ -44,10 +44,9 @@ def _imports(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.add(node.module)
             names.update(f"{node.module}.{alias.name}" for alias in node.names)
-    # Importing a module runs the packages above it, too.
-    return {name for name in names if name.startswith("stiffdice.")} | {
-        name.rpartition(".")[0] for name in names if name.count(".") > 1 and name.startswith("stiffdice.")
-    }
+    ours = {name for name in names if name.split(".")[0] == PACKAGE.name}
+    # Importing a module runs the packages above it, too; the top one says the version.
+    return {".".join(name.split(".")[:depth]) for name in ours for depth in range(1, name.count(".") + 2)}
 
 
 def _path(name: str) -> Path | None:

@@ -143,9 +143,8 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
 
     preset: a name of PRESETS that goes before the file's own `preset`; single keys go before both.
     """
-    given = {} if mapping is None else mapping
-    top = checks.known_keys("", given, ["preset", *_SECTIONS, "gravity", "duration"])
-    sections = {name: dict(checks.known_keys(name, top.get(name) or {}, _KEYS[name])) for name in _SECTIONS}
+    top = checks.known_keys("", _given(mapping), ["preset", *_SECTIONS, "gravity", "duration"])
+    sections = {name: dict(checks.known_keys(name, _given(top.get(name)), _KEYS[name])) for name in _SECTIONS}
     chosen = preset if preset is not None else top.get("preset")
     if chosen is not None:
         _apply_preset(checks.choice("preset", chosen, PRESETS), sections)
@@ -154,6 +153,11 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
         sections["launch"]["angular_momentum"] = _random_spin(spin)
     rest = {key: top[key] for key in ("gravity", "duration") if key in top}
     return Scene(**{name: cls(**sections[name]) for name, cls in _SECTIONS.items()}, **rest)
+
+
+def _given(mapping: object) -> object:
+    """Return a section as given; one with nothing in it has no keys."""
+    return {} if mapping is None else mapping
 
 
 def _apply_preset(preset: str, sections: dict[str, dict[str, Any]]) -> None:
@@ -193,7 +197,7 @@ def _override(data: Any, text: str) -> Any:
     keys = path.strip().split(".")
     if not equals or not all(keys):
         raise InputError(f"--set {text}: allowed is key.path=value, such as ground.stiffness=1e6")
-    result = dict(checks.known_keys("", data or {}, ["preset", *_SECTIONS, "gravity", "duration"]))
+    result = dict(checks.known_keys("", _given(data), ["preset", *_SECTIONS, "gravity", "duration"]))
     if len(keys) == 1:
         result[keys[0]] = yaml_file.parse(value)
         if keys[0] in _SECTIONS:
@@ -203,7 +207,7 @@ def _override(data: Any, text: str) -> Any:
         known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]
         close = difflib.get_close_matches(path, known, n=1)
         raise InputError(f"--set {text}: no such key{f'; did you mean {close[0]}?' if close else ''}")
-    section = dict(checks.known_keys(keys[0], result.get(keys[0]) or {}, _KEYS[keys[0]]))
+    section = dict(checks.known_keys(keys[0], _given(result.get(keys[0])), _KEYS[keys[0]]))
     if len(keys) == 3:
         spin = section.get(keys[1])
         section[keys[1]] = {**(spin if isinstance(spin, dict) else {}), keys[2]: yaml_file.parse(value)}

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from stiffdice import checks, measures, schemes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
+from stiffdice.energy import energies
 from stiffdice.errors import InputError
 from stiffdice.models import MODELS
 from stiffdice.scene import Scene
@@ -183,26 +184,16 @@ def _is_finite(state: Any) -> bool:
 
 def _sunk(physics: Physics, ensemble: States) -> npt.NDArray[np.bool_]:
     """Return whether every node ended below the ground, shape (member,)."""
-    return np.asarray((_depths(physics, ensemble) > 0).all(axis=-1))
-
-
-def _depths(physics: Physics, states: States) -> Array:
-    """Return each node's depth below the ground [m], negative above it, shape (..., node)."""
     normal = np.array([physics.nx, physics.ny, physics.nz])
-    with np.errstate(all="ignore"):  # a run that blew up has infinite depths
-        return np.asarray(-((states["position"][..., None, :] + states["node_offset"]) @ normal))
+    with np.errstate(all="ignore"):  # a run that blew up has infinite heights
+        heights = (ensemble["position"][:, None, :] + ensemble["node_offset"]) @ normal
+    return np.asarray((heights < 0).all(axis=1))
 
 
 def _trajectory(scene: Scene, physics: Physics, samples: States, every: int, steps: int, steps_done: int) -> Trajectory:
-    kept = steps_done // every + 1
-    state = samples[:kept]
-    step = np.arange(kept, dtype=np.int64) * every
-    with np.errstate(all="ignore"):
-        depth = np.maximum(0, _depths(physics, state))
-        kinetic = (
-            0.5 * physics.mass * np.sum(state["velocity"] ** 2, axis=-1)
-            + 0.5 * np.sum(state["angular_momentum"] ** 2, axis=-1) / physics.inertia
-        )
-        potential = physics.mass * physics.gravity * state["position"][:, 2]
-        elastic = 0.5 * physics.stiffness * np.sum(depth**2, axis=-1)
-        return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, kinetic + potential)
+    state = samples[: steps_done // every + 1]
+    step = np.arange(len(state), dtype=np.int64) * every
+    kinetic, potential, elastic = energies(physics, state)
+    with np.errstate(invalid="ignore"):  # inf − inf, where a run blew up
+        total = kinetic + potential
+    return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, total)

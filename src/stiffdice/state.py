@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -70,13 +71,17 @@ def physics_of(scene: Scene) -> Physics:
     )
 
 
+# The models that turn the cube; the others leave its spin out.
+TURNING = frozenset({"tumbling"})
+
+
 def start_of(scene: Scene, model: str) -> States:
-    """Return the state at the launch, shape (1,); a model that does not turn the cube leaves its spin out."""
+    """Return the state at the launch, shape (1,); without spin for a model that does not turn the cube."""
     launch = scene.launch
     state = np.zeros(1, STATE)
     state["position"] = launch.position
     state["velocity"] = launch.velocity
-    if model == "tumbling":
+    if model in TURNING:
         state["angular_momentum"] = launch.spin
         if launch.node_velocity == "rigid":
             state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
@@ -86,7 +91,7 @@ def start_of(scene: Scene, model: str) -> States:
 
 def rotated(offsets: Array, rotation: Array) -> Array:
     """Return offsets, shape (node, 3), turned by a rotation vector [rad] (Rodrigues' formula, equation 9)."""
-    angle = float(np.linalg.norm(rotation))
+    angle = math.hypot(*rotation)
     if angle == 0:
         return offsets.copy()
     axis = rotation / angle

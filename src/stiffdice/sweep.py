@@ -76,7 +76,9 @@ def _dataset(sweep: Sweep, cells: Sequence[Cell], runs: Sequence[Run]) -> xr.Dat
             {"long_name": "member: number k of n is launched k/n of a time step late", "units": "1"},
         ),
     }
-    attributes = layout.provenance_attributes("Sweep of stiffness and steps", sweep.scene, sweep.model, sweep.scheme)
+    attributes = layout.provenance_attributes(
+        "Sweep of stiffness and steps", sweep.scene, sweep.model, sweep.scheme, "stiffdice.sweep"
+    )
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
     return xr.Dataset(variables, coordinates, attributes)
 

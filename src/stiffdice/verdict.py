@@ -12,6 +12,8 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
+from stiffdice.state import TURNING
+
 Flags = npt.NDArray[np.bool_]
 
 
@@ -20,7 +22,7 @@ BLOW_UP = 1e3
 
 
 class Verdict(IntEnum):
-    """How a run ended; the worst that applies."""
+    """How a run ended. The numbers are stored: a new verdict gets a new one, whatever its severity."""
 
     PASSED = 0
     APEX_ROSE = 1
@@ -44,6 +46,16 @@ _SENTENCES = {
     Verdict.LEFT_NUMERIC_RANGE: "left the numeric range: a number grew past what double precision holds",
 }
 
+# From mild to grave; a run has the gravest that applies.
+SEVERITY = (
+    Verdict.PASSED,
+    Verdict.APEX_ROSE,
+    Verdict.ENERGY_GREW,
+    Verdict.SANK,
+    Verdict.BLEW_UP,
+    Verdict.LEFT_NUMERIC_RANGE,
+)
+
 
 @dataclass(frozen=True)
 class Criterion:
@@ -53,8 +65,9 @@ class Criterion:
     tolerance: float  # the default; a study may set another
     failure: Verdict
     meaning: str
-    # A tumbling cube may rightly bounce higher than before, paid for by its spin.
-    models: tuple[str, ...] = ("sliding", "tumbling")
+    # Whether it says anything of a cube that turns. One that tumbles may rightly bounce higher than before, paid for
+    # by its spin.
+    for_turning: bool = True
 
     def holds(self, measure: npt.ArrayLike, tolerance: float | None = None) -> Flags:
         """Return where the criterion holds, shape of `measure`; not-a-number never does."""
@@ -64,17 +77,24 @@ class Criterion:
 
 CRITERIA: dict[str, Criterion] = {
     "energy": Criterion(
-        "energy_ratio", 0.05, Verdict.ENERGY_GREW, "airborne energy never above (1 + tolerance) of the start"
+        "energy_ratio",
+        0.05,
+        Verdict.ENERGY_GREW,
+        "airborne energy never above (1 + tolerance) of the start",
     ),
     "apex": Criterion(
-        "apex_ratio", 0.02, Verdict.APEX_ROSE, "no apex above (1 + tolerance) of the one before", ("sliding",)
+        "apex_ratio",
+        0.02,
+        Verdict.APEX_ROSE,
+        "no apex above (1 + tolerance) of the one before",
+        for_turning=False,
     ),
 }
 
 
 def criteria_of(model: str) -> dict[str, Criterion]:
     """Return the criteria that mean something for a model."""
-    return {name: criterion for name, criterion in CRITERIA.items() if model in criterion.models}
+    return {name: part for name, part in CRITERIA.items() if part.for_turning or model not in TURNING}
 
 
 def judge(
@@ -85,11 +105,13 @@ def judge(
     measures: values by name. finite: whether every step stayed within doubles. sunk: whether the run ended with
     every node below the ground. All of one shape, which is the result's.
     """
+    energy = np.asarray(measures["energy_ratio"])
+    applies = {part.failure: ~part.holds(measures[part.measure]) for part in criteria_of(model).values()}
+    applies[Verdict.SANK] = np.asarray(sunk)
+    applies[Verdict.BLEW_UP] = energy > BLOW_UP
+    applies[Verdict.LEFT_NUMERIC_RANGE] = ~np.asarray(finite) | np.isnan(energy)
     verdict = np.full(np.shape(finite), Verdict.PASSED, dtype=np.int8)
-    for criterion in criteria_of(model).values():
-        fails = ~criterion.holds(measures[criterion.measure])
-        verdict[fails] = np.maximum(verdict[fails], criterion.failure)
-    verdict[np.asarray(sunk)] = Verdict.SANK
-    verdict[~(np.asarray(measures["energy_ratio"]) <= BLOW_UP)] = Verdict.BLEW_UP
-    verdict[~np.asarray(finite)] = Verdict.LEFT_NUMERIC_RANGE
+    for grade in SEVERITY:
+        if grade in applies:
+            verdict[applies[grade]] = grade
     return verdict

@@ -1,4 +1,4 @@
-"""What is in a file: dimensions, names, units and attributes, in one place. `docs/FORMAT.md` is this page in prose."""
+"""What is in a file: dimensions, names, units and attributes, in one place."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import xarray as xr
 from stiffdice import __version__, theory
 from stiffdice.contact import LAWS
 from stiffdice.cube import SIGNS
+from stiffdice.io import FORMAT_VERSION
 from stiffdice.measures import MEASURES
 from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, Trajectory
+from stiffdice.state import TURNING
 from stiffdice.verdict import Verdict
-
-FORMAT_VERSION = "1.0"
 
 
 def enum_attributes(long_name: str, meanings: list[str]) -> dict[str, Any]:
@@ -44,14 +44,17 @@ def measure_variables(measures: Mapping[str, npt.NDArray[np.float64]], dims: tup
     }
 
 
-def provenance_attributes(title: str, scene: Scene, model: str, scheme: str) -> dict[str, Any]:
-    """Return the global attributes that say what made a file; nothing that two rebuilds would not share."""
+def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, code: str) -> dict[str, Any]:
+    """Return the global attributes that say what made a file; nothing that two rebuilds would not share.
+
+    code: the module whose numbers the file holds.
+    """
     return {
         "Conventions": "CF-1.11",
         "title": title,
         "format_version": FORMAT_VERSION,
         "stiffdice_version": __version__,
-        "code_digest": code_digest("stiffdice.simulate"),
+        "code_digest": code_digest(code),
         "scene": json.dumps(scene.as_mapping(), sort_keys=True),
         "scene_digest": scene.digest,
         "model": model,
@@ -69,7 +72,7 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         "time": ("time", trajectory.time, {"long_name": "time since the launch", "units": "s", "axis": "T"}),
         "axis": ("axis", np.arange(3, dtype=np.int8), AXIS_ATTRIBUTES),
     }
-    if run.model == "tumbling":
+    if run.model in TURNING:
         variables |= _rotation_variables(trajectory)
         nodes = np.arange(1, len(SIGNS) + 1, dtype=np.int8)
         coordinates["node"] = ("node", nodes, {"long_name": "node, numbered as in cube.m", "units": "1"})
@@ -80,7 +83,7 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         run.steps_done[0],
         {"long_name": "steps within double range", "units": "1"},
     )
-    attributes = provenance_attributes(title, run.scene, run.model, run.scheme) | {
+    attributes = provenance_attributes(title, run.scene, run.model, run.scheme, "stiffdice.simulate") | {
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,
         "step_size_units": "s",

@@ -9,7 +9,7 @@ import h5py
 import xarray as xr
 
 from stiffdice.errors import InputError
-from stiffdice.io.layout import FORMAT_VERSION
+from stiffdice.io import FORMAT_VERSION
 
 
 def open_file(path: str | Path) -> xr.Dataset:

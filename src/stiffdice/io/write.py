@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -14,8 +15,8 @@ from stiffdice.errors import OutputError
 def check_target(path: str | Path) -> Path:
     """Return `path` if a file can be written there; raises OutputError before any work is done otherwise."""
     target = Path(path)
-    if target.is_dir():
-        raise OutputError(f"{target}: is a folder; name a file in it")
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{target}: is {'a folder; name a file in it' if target.is_dir() else 'not a regular file'}")
     if not target.parent.is_dir():
         raise OutputError(f"{target}: the folder {target.parent} does not exist")
     if not os.access(target.parent, os.W_OK | os.X_OK):
@@ -36,9 +37,10 @@ def write_bytes(data: bytes | memoryview, path: str | Path) -> None:
             temporary.replace(target)
         finally:
             temporary.unlink(missing_ok=True)
-        _sync_folder(target.parent)
     except OSError as error:
         raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+    with contextlib.suppress(OSError):  # the file is there; some file systems cannot sync a folder
+        _sync_folder(target.parent)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.compiled import njit
+from stiffdice.energy import height_of
 from stiffdice.measures import apex, energy, touchdown
 from stiffdice.state import Array, Physics
 
@@ -32,12 +33,6 @@ def values(memory: npt.NDArray[np.void]) -> dict[str, Array]:
 
 
 @njit
-def height_of(physics: Physics, state: Any) -> float:
-    """Return the centre's height above the ground plane [m]."""
-    return physics.nx * state.position[0] + physics.ny * state.position[1] + physics.nz * state.position[2]
-
-
-@njit
 def clearance_of(physics: Physics, state: Any, height: float, h: float) -> float:
     """Return the lowest node's height above the ground [m]; a lower bound where it is far from touching."""
     far = height - physics.reach
@@ -54,25 +49,13 @@ def clearance_of(physics: Physics, state: Any, height: float, h: float) -> float
 
 
 @njit
-def elastic_of(physics: Physics, state: Any, height: float) -> float:
-    """Return the energy in the ground's springs [J], S d²/2 for each node below the ground."""
-    energy = 0.0
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        depth = -(height + physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2])
-        energy += 0.5 * physics.stiffness * max(0.0, depth) ** 2
-    return energy
-
-
-@njit
 def start(memory: Any, physics: Physics, state: Any, h: float) -> None:
     """Begin to watch a run that stands at its launch."""
     height = height_of(physics, state)
     clearance = clearance_of(physics, state, height, h)
-    elastic = elastic_of(physics, state, height)
     touchdown.start(memory.touchdown_phase, clearance)
-    energy.start(memory.energy_ratio, physics, state, height, clearance, elastic)
-    apex.start(memory.apex_ratio, physics, state, height, clearance, elastic, h)
+    energy.start(memory.energy_ratio, physics, state, height, clearance)
+    apex.start(memory.apex_ratio, physics, state, height, clearance, h)
 
 
 @njit

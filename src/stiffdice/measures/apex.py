@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffdice import energy
 from stiffdice.compiled import njit
 
 LONG_NAME = "largest apex over the apex before it"
@@ -23,7 +24,7 @@ SLOTS = 8
 
 
 @njit
-def start(memory: Any, physics: Any, state: Any, height: float, clearance: float, elastic: float, h: float) -> None:
+def start(memory: Any, physics: Any, state: Any, height: float, clearance: float, h: float) -> None:
     """Begin to watch a run that stands at its launch."""
     speed = physics.nx * state.velocity[0] + physics.ny * state.velocity[1] + physics.nz * state.velocity[2]
     pull = physics.gravity * physics.nz
@@ -31,7 +32,9 @@ def start(memory: Any, physics: Any, state: Any, height: float, clearance: float
     memory[1] = height
     memory[2] = 0.0
     memory[3] = clearance
-    memory[4] = height + speed * speed / (2 * pull) + elastic / (physics.mass * pull) if pull > 0.0 else math.inf
+    memory[4] = math.inf
+    if pull > 0.0:
+        memory[4] = height + speed * speed / (2 * pull) + energy.elastic(physics, state) / (physics.mass * pull)
     memory[5] = 0.0
     memory[6] = pull
     memory[7] = h

@@ -8,9 +8,11 @@ seems to gain.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
+import numpy as np
+
+from stiffdice import energy
 from stiffdice.compiled import njit
 
 LONG_NAME = "largest airborne energy over the energy at launch"
@@ -18,13 +20,13 @@ SLOTS = 3  # energy at launch [J], what one is measured by [J], largest ratio so
 
 
 @njit
-def start(memory: Any, physics: Any, state: Any, height: float, clearance: float, elastic: float) -> None:
+def start(memory: Any, physics: Any, state: Any, height: float, clearance: float) -> None:
     """Begin to watch a run that stands at its launch."""
-    moving = _kinetic(physics, state)
-    memory[0] = moving + physics.mass * physics.gravity * state.position[2] + elastic
+    held = energy.kinetic(physics, state) + energy.elastic(physics, state)
+    memory[0] = held + energy.potential(physics, state)
     # On flat ground this is the energy at launch; on a slope, where the zero of m g z means nothing, it is
     # the energy counted from the ground right below.
-    memory[1] = moving + physics.mass * physics.gravity * abs(physics.nz * height) + elastic
+    memory[1] = held + physics.mass * physics.gravity * abs(physics.nz * height)
     if memory[1] <= 0.0:
         memory[1] = 1.0
     memory[2] = 1.0 if clearance > 0.0 else 0.0
@@ -34,22 +36,13 @@ def start(memory: Any, physics: Any, state: Any, height: float, clearance: float
 def observe(memory: Any, physics: Any, state: Any, clearance: float) -> None:
     """Look at the state after a step."""
     if clearance > 0.0:
-        energy = _kinetic(physics, state) + physics.mass * physics.gravity * state.position[2]
-        memory[2] = max(memory[2], 1.0 + (energy - memory[0]) / memory[1])
-
-
-@njit
-def _kinetic(physics: Any, state: Any) -> float:
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
-    return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
+        now = energy.kinetic(physics, state) + energy.potential(physics, state)
+        memory[2] = max(memory[2], 1.0 + (now - memory[0]) / memory[1])
 
 
 def value(memory: Any) -> Any:
     """Return the largest ratio, shape as the memory's without its last axis; 0 if it never was in the air.
 
-    Where the energies are past the range of doubles the ratio is infinite.
+    Not-a-number where the energy at launch is past the range of doubles.
     """
-    ratio = memory[..., 2].copy()
-    ratio[~(abs(memory[..., 1]) < math.inf)] = math.inf
-    return ratio
+    return np.where(np.isfinite(memory[..., 1]), memory[..., 2], np.nan)

@@ -1,8 +1,8 @@
 """Symplectic Euler, the paper's scheme: kick with the old place, then drift with the new velocity.
 
-First order. Of second order in what it conserves: without damping it keeps an energy that differs from the true one
-by O(h). Linearly stable for ωh < 2 (Hairer, Lubich and Wanner, Geometric Numerical Integration, I.1.2 and VI.3). The
-text calls it "modified forward Euler"; its equation 7 with the new u_cm is what the listings compute.
+First order. Without damping it keeps an energy that differs from the true one by O(h). Linearly stable for ωh < 2
+(Hairer, Lubich and Wanner, Geometric Numerical Integration, I.1.2 and VI.3). The text calls it "modified forward
+Euler"; its equation 7 with the new u_cm is what the listings compute.
 """
 
 from __future__ import annotations

@@ -1,0 +1,54 @@
+"""Energies of a state, for the time loop and for stored trajectories alike."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from stiffdice.compiled import njit
+from stiffdice.state import Array, Physics, States
+
+
+@njit
+def height_of(physics: Physics, state: Any) -> float:
+    """Return the centre's height above the ground plane [m]."""
+    return physics.nx * state.position[0] + physics.ny * state.position[1] + physics.nz * state.position[2]
+
+
+@njit
+def kinetic(physics: Physics, state: Any) -> float:
+    """Return the kinetic energy of translation and rotation [J], m u²/2 + L²/(2 I) as in the throw listing."""
+    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
+    return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
+
+
+@njit
+def potential(physics: Physics, state: Any) -> float:
+    """Return the potential energy m g z of the centre [J]."""
+    return physics.mass * physics.gravity * state.position[2]
+
+
+@njit
+def elastic(physics: Physics, state: Any) -> float:
+    """Return the energy in the ground's springs [J], S d²/2 for each node at a depth d below the ground."""
+    height = height_of(physics, state)
+    energy = 0.0
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        depth = -(height + physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2])
+        energy += 0.5 * physics.stiffness * max(0.0, depth) ** 2
+    return energy
+
+
+@njit(cache=True)
+def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
+    """Return kinetic, potential and elastic energy [J] of each state, shape (state,) each."""
+    count = states.shape[0]
+    result = np.empty(count), np.empty(count), np.empty(count)
+    for k in range(count):
+        result[0][k] = kinetic(physics, states[k])
+        result[1][k] = potential(physics, states[k])
+        result[2][k] = elastic(physics, states[k])
+    return result
