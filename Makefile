@@ -23,7 +23,7 @@ paper: $(READY)  ## rebuild everything the paper shows, into results/paper/
 	@$(BIN)/python workflow/run.py --cores $(CORES) paper
 
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
-	@$(BIN)/python workflow/run.py --cores $(CORES) study --config study=$(STUDY)
+	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
 
 report: paper  ## results/paper/report.html: every figure with its caption, code and configuration
 	@$(BIN)/snakemake --cores $(CORES) paper --report results/paper/report.html

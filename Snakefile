@@ -22,9 +22,9 @@ report: "workflow/report/workflow.rst"
 rule paper:
     default_target: True
     input:
-        everything_of("paper"),
+        lambda wildcards: everything_of("paper"),
 
 
 rule study:
     input:
-        everything_of(config.get("study", "paper")),
+        lambda wildcards: everything_of(str(config.get("study", "paper"))),

@@ -91,7 +91,7 @@ def test_there_is_a_scene_for_each_figure_and_shared_ones_agree():
         ("gravity: yes", "gravity = True"),
         ("cube: {mass: -1}", "cube.mass = -1: allowed is a finite number > 0 [kg]"),
         ("cube: {radius: 0}", "cube.radius = 0: allowed is a finite number > 0 [m]"),
-        ("cube: {mass: 'heavy'}", "cube.mass = heavy: allowed is a finite number > 0 [kg]"),
+        ("cube: {mass: 'heavy'}", "cube.mass = the text 'heavy': allowed is a finite number > 0 [kg]"),
         ("cube: {mass: }", "cube.mass = nothing"),
         (f"cube: {{mass: 1{'0' * 400}}}", "cube.mass = 1000"),
         ("ground: {normal: [0, 0, 0]}", "ground.normal = [0, 0, 0]: allowed is any direction but zero"),

@@ -140,7 +140,7 @@ def _sweep_of(name):
         ("question", "", "question = "),
         ("question", None, "question is missing"),
         ("dpi", 5, "dpi = 5: allowed is a whole number from 50 to 1200"),
-        ("runs.figure-04.steps", 0, "runs.figure-04.steps = 0: allowed is a whole number >= 1"),
+        ("runs.figure-04.steps", 0, "runs.figure-04.steps = 0: allowed is a whole number from 1 to"),
         ("runs.figure-04.every", 30_000, "runs.figure-04.every = 30000"),
         ("runs.figure-04.presets", ["corrected"], "state cube.inertia"),
         ("runs.Figure 4", {"scene": "x", "model": "sliding", "steps": 1}, "Figure 4"),
@@ -152,6 +152,11 @@ def _sweep_of(name):
         ),
         ("figures.energy.draw", "poetry", "figures.energy.draw = poetry: allowed is"),
         ("sweep", None, "figures.frontier: frontier draws a sweep"),
+        ("figures.frontier.run", "figure-04", "figures.frontier.run = figure-04: frontier draws the sweep"),
+        ("figures.Big Figure", {"draw": "frontier", "title": "x"}, "figures.Big Figure: allowed names have small"),
+        ("sweep.omega_h.to", 1e-300, "sweep.omega_h: asks for up to"),
+        ("sweep.set", ["ground.stiffness=3"], "the sweep sets this itself, from sweep.stiffness"),
+        ("sweep.contact", "gated", "sweep.contact = gated: allowed is a list of different contact laws"),
     ],
 )
 def test_bad_studies_end_with_one_line(changed, path, value, told):

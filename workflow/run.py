@@ -65,7 +65,7 @@ def main() -> int:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
     jobs = jobs_since(begun)
-    if jobs:
+    if jobs and status == 0:
         print("\nwhere the time went")
         print(table(jobs, time.time() - begun, options.cores))
     return status

@@ -12,10 +12,13 @@ from stiffdice.errors import InputError
 
 Vector = tuple[float, float, float]
 
+# Above 2^53 neighbouring whole numbers share one double.
+LARGEST_COUNT = 2**53
+
 
 def shown(value: object) -> str:
     """Return a value as a person typed it, cut to a readable length."""
-    text = "nothing" if value is None else str(value)
+    text = "nothing" if value is None else repr(value) if value == "" else str(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -36,7 +39,8 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
             raise ValueError
         result = float(value)
     except (ValueError, OverflowError):
-        raise InputError(f"{key} = {shown(value)}: allowed is {allowed}") from None
+        told = f"the text '{shown(value)}'" if isinstance(value, str) else shown(value)
+        raise InputError(f"{key} = {told}: allowed is {allowed}") from None
     if not math.isfinite(result):
         raise InputError(f"{key} = {shown(value)}: allowed is {allowed}")
     if (above is not None and result <= above) or (at_least is not None and result < at_least):
@@ -44,10 +48,10 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
     return result
 
 
-def count(key: str, value: object, *, at_least: int = 1, at_most: int = 2**53) -> int:
+def count(key: str, value: object, *, at_least: int = 1, at_most: int = LARGEST_COUNT) -> int:
     """Return `value` as a whole number in [at_least, at_most]; 1e4 and 1.0e4 count as whole.
 
-    Raises InputError otherwise. Above 2^53 neighbouring step numbers share one double.
+    Raises InputError otherwise.
     """
     whole = isinstance(value, numbers.Integral) or (isinstance(value, float) and value.is_integer())
     if isinstance(value, bool) or not whole or not at_least <= value <= at_most:  # type: ignore[operator]

@@ -113,7 +113,7 @@ def _whole(option: str, text: str) -> int:
     try:
         return checks.count(option, float(text))
     except ValueError:
-        raise InputError(f"{option} = {text}: allowed is a whole number >= 1") from None
+        raise InputError(f"{option} = {text}: allowed is a whole number from 1 to {checks.LARGEST_COUNT}") from None
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -123,6 +123,8 @@ def _run(options: argparse.Namespace) -> None:
     scene = scenes.load(options.scene, options.overrides, options.preset)
     steps = _whole("--steps", options.steps)
     target = check_target(options.output)
+    if target.exists() and target.samefile(options.scene):
+        raise InputError(f"{target}: is the scene itself; name another file for the output")
 
     # These take about a second to import; bad input is told before.
     from stiffdice.io.layout import run_dataset

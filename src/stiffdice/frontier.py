@@ -20,6 +20,7 @@ from stiffdice.io import layout
 from stiffdice.provenance import code_digest
 from stiffdice.verdict import Verdict, criteria_of
 
+# What a scan has edges of, and what they are.
 EDGES = {
     "first_pass": "fewest steps at which every member passes",
     "last_fail": "most steps at which a member still fails",
@@ -61,39 +62,43 @@ def power_law(stiffness: Values, steps: Values) -> dict[str, float]:
 
 
 def find(sweep: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
-    """Return the frontier of a collected sweep: dimensions contact, criterion, stiffness.
+    """Return the frontier of a collected sweep: dimensions contact, criterion, stiffness; and the scan, dimension cell.
 
     tolerances: by criterion; the others keep their defaults.
     """
     criteria = criteria_of(sweep.attrs["model"])
-    laws = np.unique(sweep.contact.values)
-    stiffnesses = np.unique(sweep.stiffness.values)
+    used = {name: tolerances.get(name, criterion.tolerance) for name, criterion in criteria.items()}
+    finite = sweep.verdict.values != Verdict.LEFT_NUMERIC_RANGE
+    holds = np.stack([finite & part.holds(sweep[part.measure].values, used[name]) for name, part in criteria.items()])
+    laws, stiffnesses = np.unique(sweep.contact.values), np.unique(sweep.stiffness.values)
     shape = (len(laws), len(criteria), len(stiffnesses))
     found = {name: np.full(shape, np.nan) for name in (*EDGES, "flips")}
     fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in ("exponent", "exponent_error", "factor")}
-    limits = [tolerances.get(name, criterion.tolerance) for name, criterion in criteria.items()]
-    finite = sweep.verdict.values != Verdict.LEFT_NUMERIC_RANGE
-    for c, (criterion, limit) in enumerate(zip(criteria.values(), limits, strict=True)):
-        passes = (finite & criterion.holds(sweep[criterion.measure].values, limit)).all(axis=1)
-        for k, law in enumerate(laws):
+    passes = np.asarray(holds.all(axis=-1))
+    for k, law in enumerate(laws):
+        for c in range(len(criteria)):
+            inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
             for s, stiffness in enumerate(stiffnesses):
                 scan = (sweep.contact.values == law) & (sweep.stiffness.values == stiffness)
-                for name, value in edges(sweep.steps.values[scan], passes[scan]).items():
+                for name, value in edges(sweep.steps.values[scan], passes[c, scan]).items():
                     found[name][k, c, s] = value
+                inside[:, s] = not passes[c, scan][0], passes[c, scan][-1], passes[c, scan][-1]
             for e, edge in enumerate(EDGES):
-                for name, value in power_law(stiffnesses, found[edge][k, c]).items():
+                # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
+                measured = np.where(inside[e], found[edge][k, c], np.nan)
+                for name, value in power_law(stiffnesses, measured).items():
                     fits[name][k, c, e] = value
-    return _dataset(sweep, laws, stiffnesses, list(criteria), limits, found, fits)
+    return _dataset(sweep, laws, stiffnesses, used, found, fits, 1 - holds.mean(axis=-1))
 
 
 def _dataset(
     sweep: xr.Dataset,
     laws: npt.NDArray[np.int8],
     stiffnesses: Values,
-    criteria: list[str],
-    tolerances: list[float],
-    found: dict[str, Values],
-    fits: dict[str, Values],
+    tolerances: Mapping[str, float],
+    found: Mapping[str, Values],
+    fits: Mapping[str, Values],
+    failing: Values,
 ) -> xr.Dataset:
     grid = ("contact", "criterion", "stiffness")
     per_edge = ("contact", "criterion", "edge")
@@ -113,7 +118,16 @@ def _dataset(
             limits,
             {"long_name": "steps at the linear stability limit, omega h = 2", "units": "1"},
         ),
-        "tolerance": ("criterion", tolerances, {"long_name": "tolerance of the criterion", "units": "1"}),
+        "failing": (
+            ("criterion", "cell"),
+            failing,
+            {"long_name": "share of a cell's members that fail the criterion", "units": "1"},
+        ),
+        "tolerance": (
+            "criterion",
+            list(tolerances.values()),
+            {"long_name": "tolerance of the criterion", "units": "1"},
+        ),
         "exponent": (per_edge, fits["exponent"], {"long_name": "exponent of the power law", "units": "1"}),
         "exponent_error": (
             per_edge,
@@ -127,13 +141,17 @@ def _dataset(
         ),
     }
     enum = layout.enum_attributes
-    coordinates = {
+    coordinates: dict[str, Any] = {
         "contact": ("contact", laws, layout.CONTACT_ATTRIBUTES),
-        "criterion": ("criterion", np.arange(len(criteria), dtype=np.int8), enum("criterion", criteria)),
+        "criterion": ("criterion", np.arange(len(tolerances), dtype=np.int8), enum("criterion", list(tolerances))),
         "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum("edge of a criterion", list(EDGES))),
         "stiffness": ("stiffness", stiffnesses, {"long_name": "ground stiffness", "units": "kg s-2"}),
     }
-    attributes = sweep.attrs | {
+    coordinates |= {
+        f"cell_{name}": ("cell", sweep[name].values, sweep[name].attrs)
+        for name in ("contact", "stiffness", "steps", "omega_h")
+    }
+    attributes = {key: value for key, value in sweep.attrs.items() if key != "verdict_criteria"} | {
         "title": "Edges of stability",
         "stiffdice_version": __version__,
         "members": sweep.sizes["member"],
@@ -146,14 +164,19 @@ def table(frontier: xr.Dataset) -> str:
     """Return the frontier as CSV: one line for each contact law, criterion and stiffness."""
     laws = frontier.contact.attrs["flag_meanings"].split()
     criteria = frontier.criterion.attrs["flag_meanings"].split()
-    lines = ["contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,first_pass,last_fail,steps_needed,flips"]
+    columns = ("first_pass", "last_fail", "steps_needed", "flips")
+    lines = [
+        "contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,"
+        + ",".join(columns)
+        + ",last_fail_exponent,last_fail_exponent_error"
+    ]
+    edge = list(EDGES).index("last_fail")
     for k, law in enumerate(frontier.contact.values):
         for c, criterion in enumerate(criteria):
+            fit = [f"{frontier[name].values[k, c, edge]:.4f}" for name in ("exponent", "exponent_error")]
             for s, stiffness in enumerate(frontier.stiffness.values):
-                numbers = [
-                    frontier[name].values[k, c, s] for name in ("first_pass", "last_fail", "steps_needed", "flips")
-                ]
+                numbers = [frontier[name].values[k, c, s] for name in columns]
                 shown = ["" if np.isnan(number) else f"{number:.0f}" for number in numbers]
                 start = [laws[law], criterion, f"{frontier.tolerance.values[c]:g}", f"{stiffness:.6g}"]
-                lines.append(",".join([*start, f"{frontier.limit.values[s]:.1f}", *shown]))
+                lines.append(",".join([*start, f"{frontier.limit.values[s]:.1f}", *shown, *fit]))
     return "\n".join(lines) + "\n"

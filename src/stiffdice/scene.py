@@ -193,13 +193,17 @@ def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = N
 
 def _override(data: Any, text: str) -> Any:
     """Return plain data with one `key.path=value` set; the value is read as YAML."""
-    path, equals, value = text.partition("=")
+    path, equals, raw = text.partition("=")
     keys = path.strip().split(".")
     if not equals or not all(keys):
         raise InputError(f"--set {text}: allowed is key.path=value, such as ground.stiffness=1e6")
+    try:
+        value = yaml_file.parse(raw)
+    except InputError as error:
+        raise error.within(f"--set {text}") from None
     result = dict(checks.known_keys("", _given(data), ["preset", *_SECTIONS, "gravity", "duration"]))
     if len(keys) == 1:
-        result[keys[0]] = yaml_file.parse(value)
+        result[keys[0]] = value
         if keys[0] in _SECTIONS:
             checks.known_keys(keys[0], result[keys[0]], _KEYS[keys[0]])
         return result
@@ -210,8 +214,8 @@ def _override(data: Any, text: str) -> Any:
     section = dict(checks.known_keys(keys[0], _given(result.get(keys[0])), _KEYS[keys[0]]))
     if len(keys) == 3:
         spin = section.get(keys[1])
-        section[keys[1]] = {**(spin if isinstance(spin, dict) else {}), keys[2]: yaml_file.parse(value)}
+        section[keys[1]] = {**(spin if isinstance(spin, dict) else {}), keys[2]: value}
     else:
-        section[keys[1]] = yaml_file.parse(value)
+        section[keys[1]] = value
     result[keys[0]] = section
     return result

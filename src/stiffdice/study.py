@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,24 +71,24 @@ class Sweep:
             for steps in self._steps_of(stiffness)
         ]
 
+    def step_range(self, stiffness: float) -> tuple[float, float]:
+        """Return the fewest and the most steps of the grid at one stiffness [kg/s²], not rounded."""
+        ends = self.steps
+        if ends is None:
+            assert self.omega_h is not None
+            scene = self.scene.with_ground(stiffness=stiffness)
+            ends = {end: theory.steps_for(scene, self.omega_h[end]) for end in ("from", "to")}
+        return min(ends["from"], ends["to"]), max(ends["from"], ends["to"])
+
     def _steps_of(self, stiffness: float) -> list[int]:
         """Return the step counts tried at one stiffness: spread evenly in their logarithm, jittered within each part.
 
         Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
         """
-        if self.steps is not None:
-            ends, count = (self.steps["from"], self.steps["to"]), int(self.steps["count"])
-        else:
-            assert self.omega_h is not None
-            scene = self.scene.with_ground(stiffness=stiffness)
-            ends = (
-                theory.steps_for(scene, self.omega_h["from"]),
-                theory.steps_for(scene, self.omega_h["to"]),
-            )
-            count = int(self.omega_h["count"])
+        low, high = np.log(self.step_range(stiffness))
+        count = int((self.steps or self.omega_h or {})["count"])
         key = int.from_bytes(hashlib.sha256(repr(stiffness).encode()).digest()[:8])
         part = (np.arange(count) + np.random.default_rng([self.seed, key]).random(count)) / count
-        low, high = np.log(min(ends)), np.log(max(ends))
         return sorted({max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)})
 
     def shards(self) -> dict[str, list[Cell]]:
@@ -125,11 +126,16 @@ class Study:
     dpi: int
 
 
+NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]*")
+
+
 def load(path: str | Path, schema: str | Path) -> Study:
     """Return the study in a YAML file, checked against the JSON schema in another and with its scenes read.
 
     Raises InputError naming the file, the key, the value and what is allowed.
     """
+    if not NAME.fullmatch(Path(path).stem):
+        raise InputError(f"{path}: allowed in a study's name are letters, digits, hyphens and underscores")
     data = yaml_file.load(path)
     _validate(data, schema, str(path))
     try:
@@ -183,6 +189,8 @@ def _told(error: Any) -> str:
     allowed = error.schema.get("errorMessage")
     if error.validator == "oneOf":
         return f"{where}: {allowed}"
+    if "propertyNames" in error.absolute_schema_path:
+        return f"{where}.{error.instance}: allowed names have small letters, digits and hyphens"
     return f"{where or 'the file'} = {checks.shown(error.instance)}: {allowed or error.message}"
 
 
@@ -210,6 +218,8 @@ def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any
     if planned.draw == "frontier":
         if "sweep" not in data:
             raise InputError(f"figures.{name}: frontier draws a sweep, and this study has none")
+        if planned.run is not None:
+            raise InputError(f"figures.{name}.run = {planned.run}: frontier draws the sweep; leave `run` out")
     elif planned.run not in data.get("runs", {}):
         allowed = " or ".join(data.get("runs", {})) or "none: this study has no runs"
         raise InputError(f"figures.{name}.run = {planned.run}: allowed is {allowed}")
@@ -231,6 +241,14 @@ def _sweep(sweep: Mapping[str, Any]) -> Sweep:
         int(sweep.get("seed", 0)),
         int(sweep.get("cells_per_shard", 500)),
     )
+    for key in ("stiffness", "contact"):
+        for override in sweep.get("set", ()):
+            if override.split("=")[0].strip() == f"ground.{key}":
+                raise InputError(f"sweep.set: {override}: the sweep sets this itself, from sweep.{key}")
+    most = max(planned.step_range(planned.stiffness[end])[1] for end in ("from", "to"))
+    if not most <= checks.LARGEST_COUNT:
+        key = "steps" if planned.steps else "omega_h"
+        raise InputError(f"sweep.{key}: asks for up to {most:.3g} steps; allowed are {checks.LARGEST_COUNT}")
     longest = min(planned.cells(), key=lambda cell: cell.steps)
     try:
         phased(planned.scene_of(longest), planned.model, longest.steps, planned.members)

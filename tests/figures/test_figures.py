@@ -27,7 +27,7 @@ def data(plan):  # noqa: F811
     throw = {preset: dataset("tumbling", preset, launch=spin, duration=2) for preset in presets}
     slide = {preset: dataset("sliding", preset, ground={"stiffness": 1e5}) for preset in presets}
     collected = sweep.collect([sweep.compute(plan, cells) for cells in plan.shards().values()])
-    both = {"sweep": collected, "frontier": frontier.find(collected, {})}
+    both = {"frontier": frontier.find(collected, {})}
     return {"cube": throw, "anim": throw, "posi": slide, "ener": slide, "fron": both}
 
 

@@ -20,7 +20,14 @@ from stiffdice.io import yaml_file
         ("10", 10),
         ("1e", "1e"),
         ("e4", "e4"),
-        ("0x10", 16),
+        ("0x10", "0x10"),
+        ("010", "010"),
+        ("1:30", "1:30"),
+        ("1_0", "1_0"),
+        ("0", 0),
+        ("-0.5", -0.5),
+        ("3.", 3.0),
+        ("+.5", 0.5),
     ],
 )
 def test_numbers_are_read_as_people_write_them(text, value):

@@ -193,6 +193,35 @@ def test_a_changed_analysis_computes_no_run_again(finished, edited):
     assert finished.jobs_due() == {"frontier": 1, "figure": 1}
 
 
+def test_a_changed_scene_is_run_again(finished, edited):
+    edited("config/scenes/figure-09.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
+    assert finished.jobs_due() == {"trajectory": 2, "figure": 1}
+
+
+def test_a_changed_scene_of_the_sweep_is_swept_again(finished, edited):
+    edited("config/scenes/figure-13.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
+    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+
+
+def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
+    edited("src/stiffdice/ensemble.py", lambda text: text + "\n")
+    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+
+
+@pytest.mark.parametrize(
+    ("script", "due"), [("figure", {"figure": 2}), ("collect", {"collect": 1, "frontier": 1, "figure": 1})]
+)
+def test_a_changed_script_does_its_part_again(finished, edited, script, due):
+    edited(f"workflow/scripts/{script}.py", lambda text: text + "\n")
+    assert finished.jobs_due() == due
+
+
+def test_a_touched_file_is_no_change(finished):
+    for path in [*(finished.folder / "workflow" / "scripts").iterdir(), *(finished.folder / "config").rglob("*.yaml")]:
+        path.touch()
+    assert finished.jobs_due() == {}
+
+
 def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
     edited("config/tiny.yaml", lambda text: text + "criteria: {apex: 0.5}\n")
     assert finished.jobs_due() == {"frontier": 1, "figure": 1}
@@ -214,6 +243,39 @@ def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
     assert done.returncode == 2
     lines = [line for line in done.stderr.splitlines() if not line.startswith("Using workflow specific profile")]
     assert lines == ["stiffdice: config/tiny.yaml: sweep.members = none: allowed is a whole number from 1 to 1000000"]
+
+
+@pytest.mark.parametrize("name", ["../x", "a b", "v1.5", "nowhere", ""])
+def test_a_study_that_is_not_there_is_one_line(finished, name):
+    command = [sys.executable, "-m", "snakemake", "-n", "study", "--config", f"study={name}"]
+    done = subprocess.run(command, cwd=finished.folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if not line.startswith("Using workflow specific profile")]
+    assert len(lines) == 1
+    assert re.match(r"stiffdice: config/.*(letters, digits, hyphens and underscores|No such file)", lines[0])
+
+
+def test_another_study_does_not_mind_a_broken_paper(finished, edited):
+    edited("config/paper.yaml", lambda text: "question: [")
+    assert finished.jobs_due() == {}
+
+
+def test_a_damaged_shard_is_named_with_its_remedy(finished, tmp_path):
+    (shard, *_) = sorted((finished.folder / "results/tiny/sweep/shards").glob("*.h5"))
+    content, stat = shard.read_bytes(), shard.stat()
+    try:
+        shard.write_bytes(content[:1000])
+        done = finished.snakemake("--forcerun", "collect")
+        assert done.returncode != 0
+        assert f"{shard.name}: not a readable HDF5 file" in done.stderr
+        assert "remove the file, and the same command computes it again" in done.stderr
+        shard.unlink()
+        assert finished.snakemake().returncode == 0
+        assert shard.read_bytes() == content
+    finally:
+        shard.write_bytes(content)
+        os.utime(shard, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+        finished.snakemake("--touch")
 
 
 def test_the_report_works_without_a_network(finished):

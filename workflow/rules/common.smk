@@ -1,5 +1,6 @@
 # What the rules share: studies, read and checked once, and the paths that follow from them.
 
+import hashlib
 import sys
 from functools import cache
 from pathlib import Path
@@ -12,11 +13,23 @@ SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 
 
 wildcard_constraints:
-    study="[a-z0-9][a-z0-9-]*",
+    study=studies.NAME.pattern,
     run="[a-z0-9][a-z0-9-]*",
     figure="[a-z0-9][a-z0-9-]*",
     preset="as_listed|as_written|corrected",
     shard="[0-9a-f]{12}",
+
+
+def code_of(script, *modules):
+    """Return a digest of a script and of the library modules it stands on.
+
+    Snakemake's own code trigger goes by the time a script was changed, which a checkout changes, too; and it does not
+    see the library. The profile turns it off.
+    """
+    digest = hashlib.sha256(code_digest(*modules).encode())
+    for name in (script, "job.py"):
+        digest.update((Path(workflow.basedir) / "workflow" / "scripts" / name).read_bytes())
+    return digest.hexdigest()
 
 
 @cache
@@ -49,11 +62,11 @@ def figure_files(name, figure):
 
 
 def data_of(wildcards):
-    """Return the files a figure is drawn from: a run as listed and as written, or the sweep and its frontier."""
+    """Return the files a figure is drawn from: a run as listed and as written, or the frontier of a sweep."""
     planned = planned_figure(wildcards)
     folder = f"results/{wildcards.study}"
     if planned.run is None:
-        return {name: f"{folder}/sweep/{name}.h5" for name in ("frontier", "sweep")}
+        return {"frontier": f"{folder}/sweep/frontier.h5"}
     presets = study(wildcards.study).runs[planned.run].presets
     return {preset: f"{folder}/runs/{planned.run}.{preset}.h5" for preset in presets}
 
@@ -66,3 +79,7 @@ def everything_of(name):
     if planned.sweep:
         files += expand("results/{study}/sweep/{file}", study=name, file=["sweep.h5", "frontier.h5", "frontier.csv"])
     return files
+
+
+# A mistake in the study asked for is told before anything else is said.
+study(str(config.get("study", "paper")))

@@ -15,7 +15,7 @@ rule figure:
     params:
         figure=lambda wildcards: planned_figure(wildcards),
         dpi=lambda wildcards: study(wildcards.study).dpi,
-        code=code_digest("stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+        code=code_of("figure.py", "stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/figure/{figure}.log",
     benchmark:
@@ -41,8 +41,7 @@ rule animation:
         ),
     params:
         figure=lambda wildcards: planned_figure(wildcards),
-        dpi=lambda wildcards: study(wildcards.study).dpi,
-        code=code_digest("stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+        code=code_of("figure.py", "stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/animation/{figure}.log",
     benchmark:

@@ -9,7 +9,7 @@ rule shard:
         # Snakemake compares plain data only; that `sweep` changed it learns from the shard's name.
         sweep=lambda wildcards: study(wildcards.study).sweep,
         cells=lambda wildcards: shards_of(wildcards.study)[wildcards.shard],
-        code=code_digest("stiffdice.sweep", "stiffdice.io.write"),
+        code=code_of("shard.py", "stiffdice.sweep", "stiffdice.io.write"),
     log:
         "results/{study}/logs/shard/{shard}.log",
     benchmark:
@@ -31,7 +31,7 @@ rule collect:
         sweep="results/{study}/sweep/sweep.h5",
         table="results/{study}/sweep/shards.csv",
     params:
-        code=code_digest("stiffdice.sweep", "stiffdice.io.read", "stiffdice.io.write"),
+        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/collect.log",
     benchmark:
@@ -59,7 +59,7 @@ rule frontier:
         ),
     params:
         tolerances=lambda wildcards: dict(study(wildcards.study).tolerances),
-        code=code_digest("stiffdice.frontier", "stiffdice.io.read", "stiffdice.io.write"),
+        code=code_of("frontier.py", "stiffdice.frontier", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/frontier.log",
     benchmark:

@@ -6,13 +6,17 @@ from typing import Any
 from job import logged
 
 from stiffdice import sweep
+from stiffdice.errors import InputError
 from stiffdice.io.read import open_file
 from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
 with logged(snakemake.log[0]) as say:
-    shards = [open_file(path) for path in snakemake.input]
+    try:
+        shards = [open_file(path) for path in snakemake.input]
+    except InputError as error:
+        raise InputError(f"{error}; remove the file, and the same command computes it again") from None
     lines = ["shard,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
     for path, shard in zip(snakemake.input, shards, strict=True):
         sizes = f"{shard.sizes['cell']},{shard.sizes['member']}"

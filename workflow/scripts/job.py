@@ -24,10 +24,25 @@ def logged(path: str) -> Iterator[Callable[[str], None]]:
 
         try:
             yield say
+        except KeyboardInterrupt:
+            sys.exit(130)
         except StiffdiceError as error:
             say(f"failed: {error}")
             print(f"stiffdice: {error}", file=sys.stderr)
             sys.exit(2)
+
+
+def tenths(say: Callable[[str], None]) -> Callable[[float], None]:
+    """Return a callback for progress that says every tenth of the work."""
+    told = 0
+
+    def tell(done: float) -> None:
+        nonlocal told
+        if done * 10 >= told + 1:
+            told = int(done * 10)
+            say(f"{done:.0%} of the steps done")
+
+    return tell
 
 
 class Stopwatch:

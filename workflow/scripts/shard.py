@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from job import Stopwatch, logged
+from job import Stopwatch, logged, tenths
 
 from stiffdice import sweep
 from stiffdice.io.write import write_dataset
@@ -12,8 +12,6 @@ snakemake: Any  # Snakemake puts it here
 with logged(snakemake.log[0]) as say:
     watch = Stopwatch()
     with watch.running():
-        shard = sweep.compute(
-            snakemake.params.sweep, snakemake.params.cells, lambda done: say(f"{done:.1%} of the steps done")
-        )
+        shard = sweep.compute(snakemake.params.sweep, snakemake.params.cells, tenths(say))
     write_dataset(shard, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

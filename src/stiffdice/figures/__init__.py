@@ -22,14 +22,14 @@ DRAWINGS: dict[str, Any] = {
     "animation": cube.animation,
     "position": trajectory.position,
     "energy": trajectory.energy,
-    "frontier": lambda data, title: frontier.steps_needed(data["frontier"], data["sweep"], title),
+    "frontier": lambda data, title: frontier.steps_needed(data["frontier"], title),
 }
 
 
 def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, paths: list[str]) -> None:
     """Draw one figure into files, whose endings say the format; equal data give equal files.
 
-    data: runs by preset, or `frontier` and `sweep`. Raises OutputError if a file cannot be stored.
+    data: runs by preset, or `frontier`. Raises OutputError if a file cannot be stored.
     """
     with style.applied():
         figure = DRAWINGS[drawing](data, title)

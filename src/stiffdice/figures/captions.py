@@ -20,11 +20,12 @@ def readable(value: float) -> str:
     return power if mantissa == "1" else f"{mantissa}×{power}"
 
 
-def describe(run: xr.Dataset) -> str:
-    """Return model, scheme, ground and steps of a run in one line, with units."""
+def describe(run: xr.Dataset, *, law: bool = False) -> str:
+    """Return model, scheme, steps and ground of a run, and its contact law if asked, in one line with units."""
     ground = json.loads(run.attrs["scene"])["ground"]
+    contact = f", {ground['contact']}" if law else ""
     return (
         f"{run.attrs['model']}, {run.attrs['scheme'].replace('_', ' ')}, {int(run.attrs['steps']):,} steps "
         f"(ωh = {run.attrs['omega_h']:.3g}); S = {readable(ground['stiffness'])} kg/s², "
-        f"D = {readable(ground['damping'])} kg/s, mu = {readable(ground['friction'])}"
+        f"D = {readable(ground['damping'])} kg/s, μ = {readable(ground['friction'])}{contact}"
     )

@@ -27,7 +27,7 @@ def at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
     figure, axes = _room(run, f"{title}, t = {float(run.time[index]):.1f} s")
     _edges(axes).set_segments(_links(run, index))
     _path(axes, run, index)
-    style.add_note(figure, describe(run))
+    style.add_note(figure, describe(run, law=True))
     return figure
 
 
@@ -35,6 +35,7 @@ def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
     """Return the whole run in real time."""
     run = next(iter(runs.values()))
     figure, axes = _room(run, title)
+    style.add_note(figure, describe(run, law=True))
     edges, trace = _edges(axes), _path(axes, run, 0)
     clock = figure.text(0.99, 0.97, "", ha="right", va="top")
     count = max(2, round(float(run.time[-1]) * FRAMES_PER_SECOND))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice import theory
 from stiffdice.figures import style
 
-_LOOKS = {
-    "energy": {"color": style.BLUE, "first": "v", "last": "^"},
-    "apex": {"color": style.VERMILION, "first": "s", "last": "D"},
-}
+# One look for each criterion, in their order.
+_LOOKS = (
+    {"color": style.BLUE, "first": "v", "last": "^"},
+    {"color": style.VERMILION, "first": "s", "last": "D"},
+    {"color": style.GREEN, "first": "o", "last": "p"},
+)
 _SAY = {
     "energy": "airborne energy ≤ {limit:g} E₀",
     "apex": "apex ≤ {limit:g} × the one before",
@@ -25,7 +29,7 @@ _SAY = {
 _LAWS = {"ungated": "as listed (ungated)", "gated": "as written (gated)"}
 
 
-def steps_needed(frontier: xr.Dataset, sweep: xr.Dataset, title: str) -> Figure:
+def steps_needed(frontier: xr.Dataset, title: str) -> Figure:
     """Return steps against stiffness above, and the same edges as ωh below, a column for each contact law."""
     laws = [frontier.contact.attrs["flag_meanings"].split()[k] for k in frontier.contact.values]
     figure = style.new_figure(title, width=4.2 * len(laws) + 0.6, height=7.0)
@@ -34,12 +38,12 @@ def steps_needed(frontier: xr.Dataset, sweep: xr.Dataset, title: str) -> Figure:
         upper, lower = panels[:, column]
         upper.set_title(_LAWS[law])
         _steps(upper, frontier.isel(contact=column))
-        _omega_h(lower, frontier.isel(contact=column), sweep)
+        _omega_h(lower, frontier.isel(contact=column))
         lower.set_xlabel("stiffness S [kg/s²]")
-    duration = json.loads(sweep.attrs["scene"])["duration"]
+    duration = json.loads(frontier.attrs["scene"])["duration"]
     panels[0, 0].set_ylabel(f"time steps in {duration:g} s [1]")
     panels[1, 0].set_ylabel("ωh of a flat landing [1]")
-    figure.legend(handles=_legend(frontier), loc="outside lower center", ncols=3)
+    figure.legend(handles=_legend(frontier), loc="outside lower center", ncols=3 if len(laws) > 1 else 1)
     return figure
 
 
@@ -53,11 +57,10 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
     panel.plot(stiffness, frontier.limit, color=style.INK, linestyle="--", linewidth=1.0, zorder=4)
     notes = []
     for c, criterion in enumerate(_criteria(frontier)):
-        look = _LOOKS[criterion]
+        look = _LOOKS[c % len(_LOOKS)]
         first, last = frontier.first_pass.values[c], frontier.last_fail.values[c]
         panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.15, linewidth=0)
-        panel.plot(stiffness, first, look["first"], color=look["color"], markersize=3.5, markerfacecolor="white")
-        panel.plot(stiffness, last, look["last"], color=look["color"], markersize=3.5)
+        _marks(panel, stiffness, first, last, look)
         exponent, error, factor = (
             float(frontier[name].values[c, 1]) for name in ("exponent", "exponent_error", "factor")
         )
@@ -69,40 +72,54 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
         panel.text(0.03, 0.95 - 0.065 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
 
 
-def _omega_h(panel: Any, frontier: xr.Dataset, sweep: xr.Dataset) -> None:
+def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str, str]) -> None:
+    """Draw last fail full and first pass open, the open mark larger, so that neither hides the other."""
+    panel.plot(stiffness, last, look["last"], color=look["color"], markersize=3.5, zorder=3)
+    panel.plot(stiffness, first, look["first"], color=look["color"], markersize=5.5, markerfacecolor="none", zorder=4)
+
+
+def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
     """Draw the edges as ωh, over all scanned cells: a dot each, dark where members fail."""
     panel.set(xscale="log", yscale="log")
-    scan = sweep.isel(cell=sweep.contact.values == int(frontier.contact))
-    share = (scan.verdict.values != 0).mean(axis=1)
-    panel.scatter(scan.stiffness, scan.omega_h, c=share, s=2.5, cmap="Greys", vmin=-0.15, vmax=1.3, linewidths=0)
+    scan = frontier.isel(cell=frontier.cell_contact.values == int(frontier.contact))
+    panel.scatter(
+        scan.cell_stiffness,
+        scan.cell_omega_h,
+        c=scan.failing.values.max(axis=0),
+        s=2.5,
+        cmap="Greys",
+        vmin=-0.15,
+        vmax=1.3,
+        linewidths=0,
+    )
     panel.axhline(theory.STABILITY_LIMIT, color=style.INK, linestyle="--", linewidth=1.0)
     scale = frontier.limit.values * theory.STABILITY_LIMIT
-    for c, criterion in enumerate(_criteria(frontier)):
-        look = _LOOKS[criterion]
-        for edge, marker in (("first_pass", "first"), ("last_fail", "last")):
-            fill = "white" if marker == "first" else look["color"]
-            panel.plot(
-                frontier.stiffness,
-                scale / frontier[edge].values[c],
-                look[marker],
-                color=look["color"],
-                markersize=3.5,
-                markerfacecolor=fill,
-            )
-    panel.set_yticks([0.1, 0.2, 0.5, 1, 2], ["0.1", "0.2", "0.5", "1", "2"])
-    panel.minorticks_off()
+    for c in range(frontier.sizes["criterion"]):
+        first, last = (scale / frontier[edge].values[c] for edge in ("first_pass", "last_fail"))
+        _marks(panel, frontier.stiffness, first, last, _LOOKS[c % len(_LOOKS)])
+    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.yaxis.set_major_formatter("{x:g}")
+    panel.yaxis.set_minor_locator(NullLocator())
 
 
 def _legend(frontier: xr.Dataset) -> list[Any]:
     handles: list[Any] = []
     for c, criterion in enumerate(_criteria(frontier)):
-        look, limit = _LOOKS[criterion], 1 + float(frontier.tolerance[c])
-        words = _SAY[criterion].format(limit=limit)
-        common: Any = {"linestyle": "none", "color": look["color"], "markersize": 4}
-        handles.append(Line2D([], [], marker=look["last"], label=f"last fail: {words}", **common))
+        look, limit = _LOOKS[c % len(_LOOKS)], 1 + float(frontier.tolerance[c])
+        words = _SAY.get(criterion, criterion).format(limit=limit)
+        common: Any = {"linestyle": "none", "color": look["color"]}
         handles.append(
-            Line2D([], [], marker=look["first"], markerfacecolor="white", label=f"first pass: {words}", **common)
+            Line2D(
+                [],
+                [],
+                marker=look["first"],
+                markersize=5.5,
+                markerfacecolor="none",
+                label=f"first pass: {words}",
+                **common,
+            )
         )
-    handles.insert(2, Line2D([], [], color=style.INK, linestyle="--", label="theory: ωh = 2"))
+        handles.append(Line2D([], [], marker=look["last"], markersize=4, label=f"last fail: {words}", **common))
+    handles.append(Line2D([], [], color=style.INK, linestyle="--", label="theory: ωh = 2"))
     handles.append(Patch(color=style.QUIET, label="scanned cell, darker: more members fail"))
     return handles

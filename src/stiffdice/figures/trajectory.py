@@ -36,11 +36,13 @@ def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
         start = float(run.energy_paper[0] + run.elastic_energy[0])
         panel.axhline(start, color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
         full = run.energy_paper + run.elastic_energy
-        panel.plot(run.time, full, color=style.QUIET, linewidth=2.2, label="with the springs'")
+        panel.plot(run.time, full, color=style.INK, linewidth=2.4, label="with the springs' energy")
         panel.plot(run.time, run.energy_paper, color=look["color"], label="paper's: kinetic + m g z", zorder=3)
         panel.set_title(look["label"])
         panel.set_ylabel("energy [J]")
         panel.legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 0.97), borderaxespad=0)
+    lowest = min(0.0, *(float(run.energy_paper.min()) for run in runs.values()))
+    panels[0].set_ylim(bottom=lowest)  # after all is drawn: it ends the automatic scaling
     return _finish(figure, panels[-1], runs)
 
 

@@ -19,7 +19,7 @@ from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, Trajectory
 from stiffdice.state import TURNING
-from stiffdice.verdict import Verdict
+from stiffdice.verdict import Verdict, criteria_of
 
 
 def enum_attributes(long_name: str, meanings: list[str]) -> dict[str, Any]:
@@ -59,6 +59,10 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, cod
         "scene_digest": scene.digest,
         "model": model,
         "scheme": scheme,
+        "verdict_criteria": "; ".join(
+            f"{name}: {criterion.measure} <= {1 + criterion.tolerance:g}"
+            for name, criterion in criteria_of(model).items()
+        ),
     }
 
 
