@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from stiffdice import study
 from stiffdice.scene import Scene, from_mapping
 
 ROOT = Path(__file__).parent.parent
@@ -52,3 +53,11 @@ def columns(table: np.ndarray, *names: str) -> np.ndarray:
 @pytest.fixture(scope="session")
 def study_schema() -> Path:
     return ROOT / "workflow" / "schemas" / "study.schema.yaml"
+
+
+@pytest.fixture(scope="session")
+def plan(study_schema):
+    """The sweep of config/quick.yaml."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        return study.load("config/quick.yaml", study_schema).sweep

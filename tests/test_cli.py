@@ -73,6 +73,9 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", "nowhere.yaml", "-o", "out.h5"], "nowhere.yaml: No such file"),
         (["run", SCENE, "-o", "nowhere/out.h5"], "the folder nowhere does not exist"),
         (["run", SCENE, "-o", "."], "is a folder"),
+        (["run", SCENE, "-o", "/dev/null"], "not a regular file"),
+        (["run", SCENE, "-o", SCENE], "is the scene itself"),
+        (["run", SCENE, "-o", "out.h5", "--set", "cube=[1"], "--set cube=[1: line 1: not valid YAML"),
         (["run", SCENE], "required: -o"),
         (["run", SCENE, "-o", "out.h5", "--steps", "0"], "--steps = 0: allowed is a whole number from 1"),
         (["run", SCENE, "-o", "out.h5", "--steps", "-5"], "--steps = -5: allowed"),
@@ -169,7 +172,7 @@ def test_help_loads_nothing_heavy():
     assert done.stdout.strip() == "[]"
 
 
-def test_readme_example_numbers(stiffdice):
+def test_the_file_holds_what_the_simulator_says(stiffdice):
     """What `run` stores is what `simulate` returns."""
     from stiffdice.scene import load
     from stiffdice.simulate import simulate

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiffdice import frontier, sweep
-from tests.test_sweep import plan  # noqa: F401
 
 STEPS = np.array([10, 20, 30, 40, 50])
 
@@ -63,13 +62,12 @@ def test_the_error_of_the_exponent_is_the_textbooks():
 
 def test_missing_points_are_left_out_and_two_are_no_law():
     stiffness = np.array([1.0, 10.0, 100.0, 1000.0])
-    assert frontier.power_law(stiffness, np.array([1, np.nan, 10, np.nan]))["exponent"] is not None
     assert np.isnan(frontier.power_law(stiffness, np.array([1, np.nan, 10, np.nan]))["exponent"])
     assert frontier.power_law(stiffness, np.array([1, np.nan, 10, 10**1.5]))["exponent"] == pytest.approx(0.5)
 
 
 @pytest.fixture(scope="module")
-def found(plan):  # noqa: F811
+def found(plan):
     collected = sweep.collect([sweep.compute(plan, cells) for cells in plan.shards().values()])
     return frontier.find(collected, {}), frontier.find(collected, {"energy": 1e6}), collected
 
@@ -102,12 +100,39 @@ def test_a_run_that_left_the_numeric_range_fails_every_criterion(found):
     assert np.isnan(frontier.find(collected, {}).first_pass).all()
 
 
+def test_the_scan_is_kept_with_its_edges(found):
+    edges, lax, collected = found
+    assert edges.cell_steps.values.tolist() == collected.steps.values.tolist()
+    failing = (collected.energy_ratio > 1.05).mean("member").values
+    np.testing.assert_allclose(edges.failing.values[0], failing, atol=1e-12)
+    assert not lax.failing.values[0].any()
+
+
+def test_an_edge_at_the_end_of_its_scan_is_no_measurement(found):
+    collected = found[2]
+    coarse = collected.isel(cell=collected.omega_h.values > 1.0)  # as written, members fail down to the last step
+    edges = frontier.find(coarse, {})
+    apex, last_fail = 1, 1
+    assert np.isfinite(edges.last_fail.values[1, apex]).all()
+    assert np.isnan(edges.exponent.values[1, apex, last_fail])
+
+
+def test_each_edge_has_its_own_fit(found):
+    edges = found[0]
+    for e, name in enumerate(frontier.EDGES):
+        alone = frontier.power_law(edges.stiffness.values, edges[name].values[1, 0])
+        assert edges.exponent.values[1, 0, e] == alone["exponent"]
+
+
 def test_the_table_has_a_line_for_each_point(found):
     edges = found[0]
     lines = frontier.table(edges).splitlines()
     assert len(lines) == 1 + edges.first_pass.size
     assert lines[0].startswith("contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,first_pass")
-    law, criterion, tolerance, stiffness, limit, first, *_ = lines[1].split(",")
+    law, criterion, tolerance, stiffness, limit, first, last, _, _, exponent, error = lines[1].split(",")
+    assert float(last) == edges.last_fail.values[0, 0, 0]
+    assert float(exponent) == pytest.approx(edges.exponent.values[0, 0, 1], abs=1e-4)
+    assert float(error) == pytest.approx(edges.exponent_error.values[0, 0, 1], abs=1e-4)
     assert (law, criterion, float(tolerance), float(stiffness)) == ("ungated", "energy", 0.05, 100.0)
     assert float(limit) == 100.0
     assert float(first) == edges.first_pass.values[0, 0, 0]

@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice import study, sweep
+from stiffdice import sweep
 from stiffdice.errors import InputError
 
 ROOT = Path(__file__).parent.parent
-
-
-@pytest.fixture(scope="module")
-def plan(study_schema):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(ROOT)
-        return study.load("config/quick.yaml", study_schema).sweep
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from matplotlib.animation import FuncAnimation
 from PIL import Image
-from tests.test_sweep import plan  # noqa: F401
 
 from stiffdice import figures, frontier, sweep
 from stiffdice.figures import captions, style
@@ -21,7 +20,7 @@ def dataset(model, preset, **keys):
 
 
 @pytest.fixture(scope="module")
-def data(plan):  # noqa: F811
+def data(plan):
     presets = ("as_listed", "as_written")
     spin = {"angular_momentum": {"seed": 1}}
     throw = {preset: dataset("tumbling", preset, launch=spin, duration=2) for preset in presets}
@@ -76,13 +75,79 @@ def test_the_animation_shows_the_cube_where_it_is(data):
     animation._draw_was_started = True  # it is not to be played
 
 
+def test_the_cube_is_drawn_turned_as_it_is(data):
+    run = data["cube"]["as_listed"]
+    for drawing, moment in (("cube-start", 0.0), ("cube-middle", 0.5), ("cube-end", 1.0)):
+        with style.applied():
+            axes = figures.DRAWINGS[drawing](data["cube"], "The throw").axes[0]
+        index = round(moment * (run.sizes["time"] - 1))
+        (cube,) = (part for part in axes.collections if len(getattr(part, "_segments3d", ())) == 12)
+        corners = np.unique(np.asarray(cube._segments3d).reshape(-1, 3).round(9), axis=0)
+        expected = np.unique((run.position.values[index] + run.node_offset.values[index]).round(9), axis=0)
+        np.testing.assert_allclose(corners, expected, atol=1e-8)
+
+
 def test_a_tilted_ground_is_drawn_where_it_is(data):
     tilted = {"normal": [0.3, 0.1, 1.0]}
     run = {"as_listed": dataset("tumbling", "as_listed", ground=tilted, launch={"position": [0, 0, 4]}, duration=1)}
     with style.applied():
-        figure = figures.DRAWINGS["cube-end"](run, "Slope")
-        ground = figure.axes[0].collections[1] if len(figure.axes[0].collections) > 1 else figure.axes[0].collections[0]
-    assert ground is not None
+        axes = figures.DRAWINGS["cube-end"](run, "Slope").axes[0]
+    (ground,) = (part for part in axes.collections if hasattr(part, "_faces"))
+    np.testing.assert_allclose(np.asarray(ground._faces).reshape(-1, 3) @ tilted["normal"], 0, atol=1e-9)
+
+
+def lines_of(axes):
+    return {line.get_label(): np.asarray(line.get_xydata()) for line in axes.get_lines()}
+
+
+def test_position_is_drawn_for_both_readings(data):
+    with style.applied():
+        figure = figures.DRAWINGS["position"](data["cube"], "Position")
+    for k, axes in enumerate(figure.axes):
+        for preset, label in (("as_listed", "as listed"), ("as_written", "as written")):
+            run = data["cube"][preset]
+            np.testing.assert_array_equal(lines_of(axes)[label], np.stack([run.time, run.position[:, k]], axis=1))
+
+
+def test_energy_is_drawn_with_and_without_the_springs(data):
+    with style.applied():
+        figure = figures.DRAWINGS["energy"](data["ener"], "Energy")
+    for axes, run in zip(figure.axes, data["ener"].values(), strict=True):
+        lines = lines_of(axes)
+        np.testing.assert_array_equal(lines["paper's: kinetic + m g z"][:, 1], run.energy_paper)
+        np.testing.assert_array_equal(lines["with the springs' energy"][:, 1], run.energy_paper + run.elastic_energy)
+        np.testing.assert_allclose(lines["energy at launch"][:, 1], 54.4, rtol=1e-14)
+
+
+def test_the_frontier_is_drawn_where_it_is(data):
+    found = data["fron"]["frontier"]
+    with style.applied():
+        figure = figures.DRAWINGS["frontier"](data["fron"], "Frontier")
+    upper, lower = figure.axes[1], figure.axes[3]  # the gated column
+    drawn = [np.asarray(line.get_xydata()) for line in upper.get_lines()]
+    wanted = [found.limit.values]
+    for c in range(2):
+        fit = found.factor.values[1, c, 1] * found.stiffness.values ** found.exponent.values[1, c, 1]
+        wanted += [found.last_fail.values[1, c], found.first_pass.values[1, c], fit]
+    assert len(drawn) == len(wanted)
+    for line, values in zip(drawn, wanted, strict=True):
+        np.testing.assert_allclose(line, np.stack([found.stiffness, values], axis=1))
+    full = [line for line in upper.get_lines() if line.get_markerfacecolor() != "none" and line.get_marker() != "None"]
+    assert len(full) == 2  # last fail is the full mark
+    below = [np.asarray(line.get_xydata())[:, 1] for line in lower.get_lines()]
+    assert set(below[0]) == {2.0}
+    np.testing.assert_allclose(below[1], np.sqrt(4 * found.stiffness) * 10 / found.last_fail.values[1, 0])
+    dots = lower.collections[0]
+    inside = found.cell_contact.values == 1
+    np.testing.assert_allclose(dots.get_offsets()[:, 1], found.cell_omega_h.values[inside])
+    np.testing.assert_allclose(dots.get_array(), found.failing.values[:, inside].max(axis=0))
+
+
+def test_the_note_under_a_figure_says_what_was_run():
+    run = dataset("sliding", "as_listed", ground={"stiffness": 1e5, "damping": 0.3, "friction": 0.4})
+    assert captions.describe(run) == (
+        "sliding, symplectic euler, 3,000 steps (ωh = 2.11); S = 10⁵ kg/s², D = 0.3 kg/s, μ = 0.4"
+    )
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from stiffdice.ensemble import phased
+from stiffdice.measures import apex, energy
 from stiffdice.scene import Scene, from_mapping
 from stiffdice.simulate import simulate
+from stiffdice.state import physics_of, start_of
 
 
 def measured(name, steps=2000, model="sliding", **keys):
@@ -105,6 +107,54 @@ def test_members_touch_down_at_evenly_spread_phases(contact, steps):
     phase = np.sort(run.measures["touchdown_phase"])
     gaps = np.diff(np.append(phase, phase[0] + 1))
     np.testing.assert_allclose(gaps, 1 / count, rtol=0.2)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1, 0.25, 0.37, 0.5])
+def test_an_apex_between_coarse_steps_is_the_parabolas(offset):
+    """Two flights of known tops, sampled at six steps each, with a step on the ground between them."""
+    scene = from_mapping({"gravity": 10.0, "launch": {"position": [0, 0, 2], "velocity": [0, 0, 0]}})
+    h = 0.1
+    t = (np.arange(6) - 2.5 - offset) * h
+    first, second = 4.0 - 5 * t**2, 5.0 - 5 * t**2
+    memory = np.zeros(apex.SLOTS)
+    apex.start(memory, physics_of(scene), start_of(scene, "sliding")[0], first[0], 1.0, h)
+    for height, clearance in [(z, 1.0) for z in first[1:]] + [(0.5, -0.1)] + [(z, 1.0) for z in second]:
+        apex.observe(memory, height, clearance)
+    assert float(apex.value(memory)) == pytest.approx(5 / 4, rel=1e-14)
+
+
+def test_a_swing_within_the_ground_is_no_flight():
+    memory = np.zeros(apex.SLOTS)
+    scene = from_mapping({"launch": {"position": [0, 0, 0.4], "velocity": [0, 0, 0]}})
+    apex.start(memory, physics_of(scene), start_of(scene, "sliding")[0], 0.4, -0.1, 0.1)
+    for height in (0.45, 0.5, 0.45, 0.4, 9.0, 0.4):
+        apex.observe(memory, height, -0.1)
+    assert apex.value(memory) == 0
+
+
+def test_the_launch_counts_with_the_top_that_its_steps_reach():
+    """From one step of a parabola under g its top is known exactly, whatever the scheme."""
+    before, now, h = 3.0 - 5 * 0.25**2, 3.0 - 5 * 0.15**2, 0.1
+    assert apex._bound_for.py_func(before, now, 10.0, h) == pytest.approx(3.0, rel=1e-14)
+
+
+def test_energy_counts_rotation_and_only_the_air():
+    scene = from_mapping({"ground": {"damping": 0.1, "friction": 0.3}, "launch": {"angular_momentum": [0.5, 1, 0.2]}})
+    run = simulate(scene, model="tumbling", steps=20_000, every=1)
+    kept = run.trajectory
+    energy_at_launch = kept.energy_paper[0]
+    assert kept.kinetic_energy[0] > 25 + 0.5 * 1.29 / scene.cube.moment_of_inertia - 1e-9
+    airborne = kept.elastic_energy == 0
+    expected = kept.energy_paper[airborne].max() / energy_at_launch
+    assert run.measures["energy_ratio"][0] == pytest.approx(expected, rel=1e-13)
+    memory = np.zeros(energy.SLOTS)
+    energy.start(memory, physics_of(scene), start_of(scene, "tumbling")[0], 3.0, 1.0)
+    fast = kept.state[:1].copy()
+    fast["velocity"] *= 10
+    energy.observe(memory, physics_of(scene), fast[0], -0.1)
+    assert energy.value(memory) == 1
+    energy.observe(memory, physics_of(scene), fast[0], 0.1)
+    assert energy.value(memory) > 40
 
 
 def test_no_touch_down_no_phase():
