@@ -69,7 +69,7 @@ def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:
     """
 
     def call(tag: Any, *arguments: Any) -> Any:
-        raise NotImplementedError("compiled code only")
+        raise TypeError("a kernel's part: call it from compiled code")
 
     @overload(call, strict=False)
     def _choose(tag: Any, *arguments: Any) -> Any:

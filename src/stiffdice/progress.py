@@ -13,11 +13,11 @@ class Progress:
     """A line that rewrites itself on a terminal, or a line every ten seconds elsewhere."""
 
     def __init__(self) -> None:
-        self._begun = time.monotonic()
         self._terminal = sys.stderr.isatty()
         self._interval = 0.2 if self._terminal else 10.0
-        self._next = self._begun + QUIET_SECONDS
+        self._next = time.monotonic() + QUIET_SECONDS
         self._shown = False
+        self._first: tuple[float, float] | None = None  # when the first part was done, compilation and all
 
     def __enter__(self) -> Progress:
         return self
@@ -25,11 +25,14 @@ class Progress:
     def show(self, fraction: float) -> None:
         """Tell the fraction done, if it is time to."""
         now = time.monotonic()
-        if now < self._next or fraction >= 1:
+        if self._first is None:
+            self._first = now, fraction
+        since, before = self._first
+        if now < self._next or fraction >= 1 or fraction <= before:
             return
         self._next = now + self._interval
         self._shown = True
-        left = (now - self._begun) * (1 - fraction) / fraction
+        left = (now - since) * (1 - fraction) / (fraction - before)
         end = "\r" if self._terminal else "\n"
         print(f"{fraction:6.1%} done, about {left:.0f} s left  ", end=end, file=sys.stderr, flush=True)
 
