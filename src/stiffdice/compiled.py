@@ -22,10 +22,13 @@ def _cache_folder() -> Path:
     parts = [code_digest("stiffdice.simulate"), version("numba"), version("numpy"), version("llvmlite")]
     name = "kernels-" + hashlib.sha256(" ".join([*parts, _cpu()]).encode()).hexdigest()[:16]
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    home = Path(base) if base else Path("~/.cache").expanduser()
+    fallback = Path(tempfile.gettempdir()) / f"stiffdice-{os.getuid()}"
+    try:
+        home = Path(base) if base else Path("~/.cache").expanduser()
+    except RuntimeError:  # a user without a home
+        home = fallback
     if home.name.startswith("kernels-") and home.parent.name == "stiffdice":
         home = home.parent.parent  # a parent process set it to its own folder
-    fallback = Path(tempfile.gettempdir()) / f"stiffdice-{os.getuid()}"
     for folder in (home / "stiffdice" / name, fallback / name):
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
