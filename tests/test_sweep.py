@@ -1,15 +1,11 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from stiffdice import sweep
 from stiffdice.errors import InputError
-
-ROOT = Path(__file__).parent.parent
 
 
 @pytest.fixture(scope="module")

@@ -58,6 +58,18 @@ reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})
 
 
 @njit
+def height_of(physics: Any, state: Any) -> float:
+    """Return the centre's height above the ground plane [m]."""
+    return physics.nx * state.position[0] + physics.ny * state.position[1] + physics.nz * state.position[2]
+
+
+@njit
+def speed_of(physics: Any, state: Any) -> float:
+    """Return the centre's speed away from the ground plane [m/s]."""
+    return physics.nx * state.velocity[0] + physics.ny * state.velocity[1] + physics.nz * state.velocity[2]
+
+
+@njit
 def node_force(law: Any, physics: Any, depth: float, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
     """Return the force on one node [N]: its weight, the normal force and friction, added in the listings' order.
 

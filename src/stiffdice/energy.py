@@ -7,13 +7,8 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
+from stiffdice.contact import height_of
 from stiffdice.state import Array, Physics, States
-
-
-@njit
-def height_of(physics: Physics, state: Any) -> float:
-    """Return the centre's height above the ground plane [m]."""
-    return physics.nx * state.position[0] + physics.ny * state.position[1] + physics.nz * state.position[2]
 
 
 @njit

@@ -20,12 +20,12 @@ def phased(scene: Scene, model: str, steps: int, count: int) -> States:
     downwards gets members whose energies differ by that drag over less than a step.)
     Raises InputError if the cube is not clear of the ground from the launch on for a whole step.
     """
-    members = np.repeat(start_of(scene, model), count)
+    (start,) = launched = start_of(scene, model)
+    members = np.repeat(launched, count)
     if count == 1:
         return members
     delay = np.arange(count) / count * (scene.duration / steps)
     down = np.array([0.0, 0.0, -scene.gravity])
-    start = start_of(scene, model)[0]
     members["position"] += start["velocity"] * delay[:, None] + 0.5 * down * delay[:, None] ** 2
     members["velocity"] += down * delay[:, None]
     spin = start["angular_momentum"] / scene.cube.moment_of_inertia

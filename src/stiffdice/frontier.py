@@ -17,6 +17,7 @@ import xarray as xr
 from stiffdice import __version__, theory
 from stiffdice import scene as scenes
 from stiffdice.io import layout
+from stiffdice.io.enums import enum_attributes, meanings_of
 from stiffdice.provenance import code_digest
 from stiffdice.verdict import Verdict, criteria_of
 
@@ -80,9 +81,10 @@ def find(sweep: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
             inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
             for s, stiffness in enumerate(stiffnesses):
                 scan = (sweep.contact.values == law) & (sweep.stiffness.values == stiffness)
-                for name, value in edges(sweep.steps.values[scan], passes[c, scan]).items():
+                row = passes[c, scan]
+                for name, value in edges(sweep.steps.values[scan], row).items():
                     found[name][k, c, s] = value
-                inside[:, s] = not passes[c, scan][0], passes[c, scan][-1], passes[c, scan][-1]
+                inside[:, s] = not row[0], row[-1], row[-1]
             for e, edge in enumerate(EDGES):
                 # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
                 measured = np.where(inside[e], found[edge][k, c], np.nan)
@@ -140,11 +142,14 @@ def _dataset(
             {"long_name": "steps at stiffness 1 kg s-2 by the power law", "units": "1"},
         ),
     }
-    enum = layout.enum_attributes
     coordinates: dict[str, Any] = {
         "contact": ("contact", laws, layout.CONTACT_ATTRIBUTES),
-        "criterion": ("criterion", np.arange(len(tolerances), dtype=np.int8), enum("criterion", list(tolerances))),
-        "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum("edge of a criterion", list(EDGES))),
+        "criterion": (
+            "criterion",
+            np.arange(len(tolerances), dtype=np.int8),
+            enum_attributes("criterion", list(tolerances)),
+        ),
+        "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum_attributes("edge of a criterion", list(EDGES))),
         "stiffness": ("stiffness", stiffnesses, {"long_name": "ground stiffness", "units": "kg s-2"}),
     }
     coordinates |= {
@@ -162,15 +167,15 @@ def _dataset(
 
 def table(frontier: xr.Dataset) -> str:
     """Return the frontier as CSV: one line for each contact law, criterion and stiffness."""
-    laws = frontier.contact.attrs["flag_meanings"].split()
-    criteria = frontier.criterion.attrs["flag_meanings"].split()
+    laws = meanings_of(frontier.contact)
+    criteria = meanings_of(frontier.criterion)
     columns = ("first_pass", "last_fail", "steps_needed", "flips")
     lines = [
         "contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,"
         + ",".join(columns)
         + ",last_fail_exponent,last_fail_exponent_error"
     ]
-    edge = list(EDGES).index("last_fail")
+    edge = meanings_of(frontier.edge).index("last_fail")
     for k, law in enumerate(frontier.contact.values):
         for c, criterion in enumerate(criteria):
             fit = [f"{frontier[name].values[k, c, edge]:.4f}" for name in ("exponent", "exponent_error")]

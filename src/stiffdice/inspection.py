@@ -9,6 +9,8 @@ import numpy as np
 import xarray as xr
 import yaml
 
+from stiffdice.io.enums import meanings_of
+
 _LONG = ("scene", "scene_digest", "code_digest", "analysis_code_digest", "title", "Conventions")
 
 
@@ -47,7 +49,7 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
 
 def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
     """Return how many runs ended with each verdict, those that none ended with left out."""
-    names = str(dataset.verdict.attrs["flag_meanings"]).split()
+    names = meanings_of(dataset.verdict)
     counts = np.bincount(dataset.verdict.values.astype(int).ravel(), minlength=len(names))
     return {name: int(count) for name, count in zip(names, counts, strict=True) if count}
 

@@ -135,6 +135,7 @@ class Scene:
 
 
 _SECTIONS: dict[str, Any] = {"cube": Cube, "ground": Ground, "launch": Launch}
+_TOP_KEYS = ("preset", *_SECTIONS, "gravity", "duration")
 _KEYS = {name: [part.name for part in dataclasses.fields(cls)] for name, cls in _SECTIONS.items()}
 
 
@@ -143,7 +144,7 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
 
     preset: a name of PRESETS that goes before the file's own `preset`; single keys go before both.
     """
-    top = checks.known_keys("", _given(mapping), ["preset", *_SECTIONS, "gravity", "duration"])
+    top = checks.known_keys("", _given(mapping), _TOP_KEYS)
     sections = {name: dict(checks.known_keys(name, _given(top.get(name)), _KEYS[name])) for name in _SECTIONS}
     chosen = preset if preset is not None else top.get("preset")
     if chosen is not None:
@@ -201,7 +202,7 @@ def _override(data: Any, text: str) -> Any:
         value = yaml_file.parse(raw)
     except InputError as error:
         raise error.within(f"--set {text}") from None
-    result = dict(checks.known_keys("", _given(data), ["preset", *_SECTIONS, "gravity", "duration"]))
+    result = dict(checks.known_keys("", _given(data), _TOP_KEYS))
     if len(keys) == 1:
         result[keys[0]] = value
         if keys[0] in _SECTIONS:

@@ -38,7 +38,12 @@ class Trajectory:
     kinetic_energy: Array
     potential_energy: Array
     elastic_energy: Array
-    energy_paper: Array
+
+    @property
+    def energy_paper(self) -> Array:
+        """Kinetic and potential energy as the listings add them [J]."""
+        with np.errstate(invalid="ignore"):  # inf − inf, where a run blew up
+            return self.kinetic_energy + self.potential_energy
 
 
 @dataclass(frozen=True)
@@ -193,7 +198,4 @@ def _sunk(physics: Physics, ensemble: States) -> npt.NDArray[np.bool_]:
 def _trajectory(scene: Scene, physics: Physics, samples: States, every: int, steps: int, steps_done: int) -> Trajectory:
     state = samples[: steps_done // every + 1]
     step = np.arange(len(state), dtype=np.int64) * every
-    kinetic, potential, elastic = energies(physics, state)
-    with np.errstate(invalid="ignore"):  # inf − inf, where a run blew up
-        total = kinetic + potential
-    return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, total)
+    return Trajectory(step, step / steps * scene.duration, state, *energies(physics, state))

@@ -71,13 +71,19 @@ class Sweep:
             for steps in self._steps_of(stiffness)
         ]
 
+    @property
+    def _grid(self) -> Mapping[str, float]:
+        """The span of steps, given as counts or as ωh."""
+        grid = self.omega_h if self.steps is None else self.steps
+        assert grid is not None, "the schema asks for one of them"
+        return grid
+
     def step_range(self, stiffness: float) -> tuple[float, float]:
         """Return the fewest and the most steps of the grid at one stiffness [kg/s²], not rounded."""
-        ends = self.steps
-        if ends is None:
-            assert self.omega_h is not None
+        ends = self._grid
+        if self.steps is None:
             scene = self.scene.with_ground(stiffness=stiffness)
-            ends = {end: theory.steps_for(scene, self.omega_h[end]) for end in ("from", "to")}
+            ends = {end: theory.steps_for(scene, ends[end]) for end in ("from", "to")}
         return min(ends["from"], ends["to"]), max(ends["from"], ends["to"])
 
     def _steps_of(self, stiffness: float) -> list[int]:
@@ -86,7 +92,7 @@ class Sweep:
         Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
         """
         low, high = np.log(self.step_range(stiffness))
-        count = int((self.steps or self.omega_h or {})["count"])
+        count = int(self._grid["count"])
         key = int.from_bytes(hashlib.sha256(repr(stiffness).encode()).digest()[:8])
         part = (np.arange(count) + np.random.default_rng([self.seed, key]).random(count)) / count
         return sorted({max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)})

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from stiffdice import theory
+from stiffdice.contact import LAWS
 from stiffdice.ensemble import phased
 from stiffdice.errors import InputError
 from stiffdice.io import layout
@@ -47,7 +48,7 @@ def _dataset(sweep: Sweep, cells: Sequence[Cell], runs: Sequence[Run]) -> xr.Dat
         np.stack([run.steps_done for run in runs]),
         {"long_name": "steps within double range", "units": "1"},
     )
-    names = list(layout.CONTACT_ATTRIBUTES["flag_meanings"].split())
+    names = list(LAWS)
     omega_h = [theory.omega_h(sweep.scene_of(cell), cell.steps) for cell in cells]
     coordinates = {
         "contact": (

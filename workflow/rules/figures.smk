@@ -29,9 +29,7 @@ rule figure:
         "../scripts/figure.py"
 
 
-rule animation:
-    input:
-        unpack(data_of),
+use rule figure as animation with:
     output:
         report(
             "results/{study}/figures/{figure}.gif",
@@ -41,15 +39,9 @@ rule animation:
         ),
     params:
         figure=lambda wildcards: planned_figure(wildcards),
+        dpi=80,  # for screens, whatever the study asks of its PNG files
         code=code_of("figure.py", "stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/animation/{figure}.log",
     benchmark:
         "results/{study}/benchmarks/animation/{figure}.tsv"
-    resources:
-        mem_mb=700,
-        runtime=10,
-    conda:
-        "../envs/stiffdice.yaml"
-    script:
-        "../scripts/figure.py"

@@ -12,5 +12,5 @@ snakemake: Any  # Snakemake puts it here
 planned = snakemake.params.figure
 with logged(snakemake.log[0]) as say:
     data = {name: open_file(path) for name, path in snakemake.input.items()}
-    figures.draw(planned.draw, data, planned.title, snakemake.params.get("dpi", 80), list(snakemake.output))
+    figures.draw(planned.draw, data, planned.title, snakemake.params.dpi, list(snakemake.output))
     say(f"{planned.draw} drawn")

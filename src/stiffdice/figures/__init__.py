@@ -39,17 +39,17 @@ def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, pat
 
 def _encoded(figure: Figure | FuncAnimation, kind: str, dpi: int) -> bytes:
     if isinstance(figure, FuncAnimation):
-        return _gif(figure)
+        return _gif(figure, dpi)
     stream = io.BytesIO()
     metadata = {"svg": {"Date": None, "Creator": "stiffdice"}, "png": {"Software": "stiffdice"}}[kind]
     figure.savefig(stream, format=kind, dpi=dpi, metadata=metadata)
     return stream.getvalue()
 
 
-def _gif(animation: FuncAnimation) -> bytes:
+def _gif(animation: FuncAnimation, dpi: int) -> bytes:
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
-        animation.save(path, writer=PillowWriter(fps=cube.FRAMES_PER_SECOND), dpi=80)
+        animation.save(path, writer=PillowWriter(fps=cube.FRAMES_PER_SECOND), dpi=dpi)
         return path.read_bytes()

@@ -15,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice import theory
 from stiffdice.figures import style
+from stiffdice.io.enums import meanings_of
 
 # One look for each criterion, in their order.
 _LOOKS = (
@@ -31,7 +32,7 @@ _LAWS = {"ungated": "as listed (ungated)", "gated": "as written (gated)"}
 
 def steps_needed(frontier: xr.Dataset, title: str) -> Figure:
     """Return steps against stiffness above, and the same edges as ωh below, a column for each contact law."""
-    laws = [frontier.contact.attrs["flag_meanings"].split()[k] for k in frontier.contact.values]
+    laws = [meanings_of(frontier.contact)[k] for k in frontier.contact.values]
     figure = style.new_figure(title, width=4.2 * len(laws) + 0.6, height=7.0)
     panels = figure.subplots(2, len(laws), sharex=True, sharey="row", squeeze=False)
     for column, law in enumerate(laws):
@@ -47,22 +48,19 @@ def steps_needed(frontier: xr.Dataset, title: str) -> Figure:
     return figure
 
 
-def _criteria(frontier: xr.Dataset) -> list[str]:
-    return list(frontier.criterion.attrs["flag_meanings"].split())
-
-
 def _steps(panel: Any, frontier: xr.Dataset) -> None:
     stiffness = frontier.stiffness.values
     panel.set(xscale="log", yscale="log")
     panel.plot(stiffness, frontier.limit, color=style.INK, linestyle="--", linewidth=1.0, zorder=4)
     notes = []
-    for c, criterion in enumerate(_criteria(frontier)):
+    fitted = meanings_of(frontier.edge).index("last_fail")
+    for c, criterion in enumerate(meanings_of(frontier.criterion)):
         look = _LOOKS[c % len(_LOOKS)]
         first, last = frontier.first_pass.values[c], frontier.last_fail.values[c]
         panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.15, linewidth=0)
         _marks(panel, stiffness, first, last, look)
         exponent, error, factor = (
-            float(frontier[name].values[c, 1]) for name in ("exponent", "exponent_error", "factor")
+            float(frontier[name].values[c, fitted]) for name in ("exponent", "exponent_error", "factor")
         )
         if np.isfinite(exponent):
             panel.plot(stiffness, factor * stiffness**exponent, color=look["color"], linewidth=0.8)
@@ -104,7 +102,7 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
 
 def _legend(frontier: xr.Dataset) -> list[Any]:
     handles: list[Any] = []
-    for c, criterion in enumerate(_criteria(frontier)):
+    for c, criterion in enumerate(meanings_of(frontier.criterion)):
         look, limit = _LOOKS[c % len(_LOOKS)], 1 + float(frontier.tolerance[c])
         words = _SAY.get(criterion, criterion).format(limit=limit)
         common: Any = {"linestyle": "none", "color": look["color"]}

@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 # Okabe and Ito, "Color Universal Design" (2008), ordered by lightness in grey.
-BLUE, VERMILION, GREEN, SKY, ORANGE = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#E69F00"
+BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 INK, QUIET, FAINT = "#222222", "#6e6e6e", "#d9d9d9"
 
 LISTED, WRITTEN = BLUE, ORANGE

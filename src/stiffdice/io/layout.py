@@ -14,23 +14,13 @@ from stiffdice import __version__, theory
 from stiffdice.contact import LAWS
 from stiffdice.cube import SIGNS
 from stiffdice.io import FORMAT_VERSION
+from stiffdice.io.enums import enum_attributes
 from stiffdice.measures import MEASURES
 from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, Trajectory
 from stiffdice.state import TURNING
 from stiffdice.verdict import Verdict, criteria_of
-
-
-def enum_attributes(long_name: str, meanings: list[str]) -> dict[str, Any]:
-    """Return the CF attributes of an int8 variable whose value k means meanings[k]."""
-    return {
-        "long_name": long_name,
-        "units": "1",
-        "flag_values": np.arange(len(meanings), dtype=np.int8),
-        "flag_meanings": " ".join(meanings),
-    }
-
 
 CONTACT_ATTRIBUTES = enum_attributes("contact law", list(LAWS))
 VERDICT_ATTRIBUTES = enum_attributes("verdict", [verdict.name.lower() for verdict in Verdict])

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.compiled import njit
-from stiffdice.energy import height_of
+from stiffdice.contact import height_of, speed_of
 from stiffdice.measures import apex, energy, touchdown
 from stiffdice.state import Array, Physics
 
@@ -36,11 +36,9 @@ def values(memory: npt.NDArray[np.void]) -> dict[str, Array]:
 def clearance_of(physics: Physics, state: Any, height: float, h: float) -> float:
     """Return the lowest node's height above the ground [m]; a lower bound where it is far from touching."""
     far = height - physics.reach
-    if far > 0.0:
-        speed = physics.nx * state.velocity[0] + physics.ny * state.velocity[1] + physics.nz * state.velocity[2]
-        # Farther than it can fall in the next step, so that the step in which it touches down starts exact.
-        if far > 2 * h * (abs(speed) + h * physics.gravity):
-            return far
+    # Farther than it can fall in the next step, so that the step in which it touches down starts exact.
+    if far > 0.0 and far > 2 * h * (abs(speed_of(physics, state)) + h * physics.gravity):
+        return far
     lowest = physics.reach
     nodes = state.node_offset
     for k in range(nodes.shape[0]):

@@ -16,6 +16,7 @@ import numpy as np
 
 from stiffdice import energy
 from stiffdice.compiled import njit
+from stiffdice.contact import speed_of
 
 LONG_NAME = "largest apex over the apex before it"
 # Height two steps ago and one step ago, clearance two steps ago and one step ago [m], last apex [m], largest ratio
@@ -26,7 +27,7 @@ SLOTS = 8
 @njit
 def start(memory: Any, physics: Any, state: Any, height: float, clearance: float, h: float) -> None:
     """Begin to watch a run that stands at its launch."""
-    speed = physics.nx * state.velocity[0] + physics.ny * state.velocity[1] + physics.nz * state.velocity[2]
+    speed = speed_of(physics, state)
     pull = physics.gravity * physics.nz
     memory[0] = math.nan
     memory[1] = height

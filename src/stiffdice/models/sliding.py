@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
-from stiffdice.contact import Wrench, node_force, reaches
+from stiffdice.contact import Wrench, height_of, node_force, reaches
 from stiffdice.state import Physics
 
 
@@ -19,10 +19,9 @@ TAG = Sliding()
 @njit
 def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the total force on the cube [N]; its torque is left out."""
-    x, y, z = state.position[0], state.position[1], state.position[2]
-    height = physics.nx * x + physics.ny * y + physics.nz * z
-    if not reaches(law, height - physics.reach):
+    if not reaches(law, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+    x, y, z = state.position[0], state.position[1], state.position[2]
     ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
     nodes = state.node_offset
     fx = fy = fz = 0.0

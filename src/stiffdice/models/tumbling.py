@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
-from stiffdice.contact import Wrench, node_force, reaches
+from stiffdice.contact import Wrench, height_of, node_force, reaches
 from stiffdice.models import sliding
 from stiffdice.state import Physics
 
@@ -21,10 +21,9 @@ TAG = Tumbling()
 @njit
 def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the total force [N] and torque about the centre [N m] (equations 3 and 10)."""
-    x, y, z = state.position[0], state.position[1], state.position[2]
-    height = physics.nx * x + physics.ny * y + physics.nz * z
-    if not reaches(law, height - physics.reach):
+    if not reaches(law, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+    x, y, z = state.position[0], state.position[1], state.position[2]
     ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
     wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
     nodes = state.node_offset
