@@ -1,6 +1,7 @@
-# stiffdice: config -> scenes -> runs -> shards -> sweep -> frontier -> figures.
+# stiffdice: config -> scenes -> runs -> shards -> sweep -> frontier -> figures; and experiments -> figures.
 #
 #   snakemake paper                       everything the paper shows
+#   snakemake stability                   what "stable" means, measured
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -13,6 +14,7 @@ min_version("9.0")
 include: "workflow/rules/common.smk"
 include: "workflow/rules/scenes.smk"
 include: "workflow/rules/sweep.smk"
+include: "workflow/rules/experiments.smk"
 include: "workflow/rules/figures.smk"
 
 
@@ -23,6 +25,11 @@ rule paper:
     default_target: True
     input:
         lambda wildcards: everything_of("paper"),
+
+
+rule stability:
+    input:
+        lambda wildcards: everything_of("stability"),
 
 
 rule study:

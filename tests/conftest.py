@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from stiffdice import study
+from stiffdice import study, sweep
+from stiffdice.io.read import parts
 from stiffdice.scene import Scene, from_mapping
 
 ROOT = Path(__file__).parent.parent
@@ -60,4 +61,27 @@ def plan(study_schema):
     """The sweep of config/quick.yaml."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        return study.load("config/quick.yaml", study_schema).sweep
+        return study.load("config/quick.yaml", study_schema).sweeps["steps-needed"]
+
+
+@pytest.fixture(scope="session")
+def shards(plan, tmp_path_factory):
+    """The files of that sweep's shards."""
+    folder = tmp_path_factory.mktemp("shards")
+    paths = []
+    for name, columns in plan.shards().items():
+        paths.append(folder / f"{name}.h5")
+        sweep.compute(plan, columns, paths[-1])
+    return paths
+
+
+@pytest.fixture(scope="session")
+def collected(plan, shards):
+    """All cells of that sweep, judged."""
+    return sweep.collect(each(shards), plan.criteria)
+
+
+def each(paths):
+    """Read one file after another, part by part, as the workflow does."""
+    for path in paths:
+        yield from parts(path, 7)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import subprocess
 import sys
@@ -11,7 +12,8 @@ import matplotlib as mpl
 import pytest
 import yaml
 
-from stiffdice.figures import DRAWINGS
+from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES
+from stiffdice.criteria import CRITERIA
 from stiffdice.scene import PRESETS, Scene
 
 ROOT = Path(__file__).parent.parent
@@ -63,17 +65,25 @@ def test_the_table_of_scene_keys_has_every_key_and_its_default():
 def test_the_table_of_study_keys_has_every_key():
     schema = yaml.safe_load((ROOT / "workflow/schemas/study.schema.yaml").read_text())
     told = " ".join(row[0] for row in table_keys("config/README.md", "Study"))
-    kinds = schema["$defs"]
-    keys = [*schema["properties"], *kinds["sweep"]["properties"], *kinds["run"]["properties"]]
-    keys += [*schema["properties"]["criteria"]["properties"]]
-    keys += [*schema["properties"]["figures"]["additionalProperties"]["properties"]]
+    parts = schema["properties"]
+    keys = [*parts, *schema["$defs"]["sweep"]["properties"], *schema["$defs"]["run"]["properties"], *CRITERIA]
+    for name in ("experiments", "figures", "tables"):
+        keys += [*parts[name]["additionalProperties"]["properties"]]
     for key in keys:
         assert re.search(rf"[`.]{key}[`.]", told), key
 
 
+def test_every_option_of_an_experiment_is_explained():
+    text = (ROOT / "config/README.md").read_text()
+    for name, entry in EXPERIMENTS.items():
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
+        for option, part in inspect.signature(entry.load()).parameters.items():
+            assert part.kind is not part.KEYWORD_ONLY or f"`{option}`" in row, (name, option)
+
+
 def test_every_drawing_is_named():
     text = (ROOT / "config/README.md").read_text()
-    assert all(f"`{name}`" in text for name in DRAWINGS)
+    assert all(f"`{name}`" in text for name in [*DRAWINGS, *TABLES, *EXPERIMENTS])
 
 
 def test_make_targets_of_the_readme_exist():

@@ -6,6 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiffdice import frontier, sweep
+from stiffdice.io.enums import meanings_of
+from tests.conftest import each
 
 STEPS = np.array([10, 20, 30, 40, 50])
 
@@ -66,73 +68,160 @@ def test_missing_points_are_left_out_and_two_are_no_law():
     assert frontier.power_law(stiffness, np.array([1, np.nan, 10, 10**1.5]))["exponent"] == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 50.0])
+def test_the_band_is_the_textbooks(factor):
+    """Against numpy polyfit's covariance, propagated to the line."""
+    rng = np.random.default_rng(1)
+    stiffness = np.geomspace(1e2, 1e7, 11)
+    steps = factor * stiffness**0.5 * 10 ** rng.normal(0, 0.1, 11)
+    fit = frontier.power_law(stiffness, steps)
+    (slope, base), covariance = np.polyfit(np.log10(stiffness), np.log10(steps), 1, cov=True)
+    at = np.geomspace(1, 1e9, 7)
+    x = np.log10(at)
+    error = np.sqrt(covariance[0, 0] * x**2 + 2 * covariance[0, 1] * x + covariance[1, 1])
+    low, high = frontier.band(fit, at)
+    np.testing.assert_allclose(np.log10(low), slope * x + base - 2 * error, atol=1e-9)
+    np.testing.assert_allclose(np.log10(high), slope * x + base + 2 * error, atol=1e-9)
+
+
+@given(
+    st.floats(-1, 1), st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=12), st.floats(-3, 12).map(lambda x: 10.0**x)
+)
+def test_the_band_holds_the_line_and_is_narrowest_at_the_centre(exponent, noise, stiffness):
+    grid = np.geomspace(10, 1e6, len(noise))
+    fit = frontier.power_law(grid, 100 * grid**exponent * 10 ** np.array(noise))
+    at = np.array([stiffness, fit["centre"]])
+    low, high = frontier.band(fit, at)
+    line = fit["factor"] * at ** fit["exponent"]
+    assert (low <= line * (1 + 1e-12)).all()
+    assert (line <= high * (1 + 1e-12)).all()
+    assert np.log(high[0] / low[0]) >= np.log(high[1] / low[1]) - 1e-9
+
+
+@pytest.mark.parametrize(
+    ("passing", "members", "low", "high"),
+    [
+        # Wilson's interval at 95 %: Newcombe (1998), Statistics in Medicine 17, 857, table I, and by hand (n/(n + z²)).
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+        (32, 32, 0.8928, 1.0),
+        (0, 32, 0.0, 0.1072),
+    ],
+)
+def test_confidence_is_wilsons(passing, members, low, high):
+    found = frontier.confidence(np.array([passing]), members)
+    assert np.ravel(found) == pytest.approx([low, high], abs=6e-5)
+
+
+@given(st.integers(1, 10_000).flatmap(lambda members: st.tuples(st.integers(0, members), st.just(members))))
+def test_confidence_holds_the_share_and_is_the_same_for_passing_and_failing(given):
+    passing, members = given
+    low, high = frontier.confidence(np.array([passing]), members)
+    assert 0 <= low <= passing / members <= high <= 1
+    mirrored = frontier.confidence(np.array([members - passing]), members)
+    np.testing.assert_allclose(mirrored, (1 - high, 1 - low), atol=1e-12)
+
+
 @pytest.fixture(scope="module")
-def found(plan):
-    collected = sweep.collect([sweep.compute(plan, cells) for cells in plan.shards().values()])
-    return frontier.find(collected, {}), frontier.find(collected, {"energy": 1e6}), collected
+def lax(plan, shards):
+    """The same runs, judged by a tolerance that lets all energies pass."""
+    return sweep.collect(each(shards), {"energy": 1e6, "apex": 0.02})
+
+
+@pytest.fixture(scope="module")
+def found(collected):
+    return frontier.find(collected)
+
+
+UNGATED, GATED = 0, 1
+ENERGY, APEX = 0, 1
+LAST_FAIL = 1
+
+
+def test_dimensions_are_named(found, collected, plan):
+    assert found.first_pass.dims == ("contact", "criterion", "stiffness")
+    assert meanings_of(found.criterion) == list(plan.criteria)
+    assert found.stiffness.values.tolist() == sorted(set(collected.stiffness.values))
+    for name, variable in found.variables.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
 
 
 def test_both_laws_fail_above_the_linear_limit_and_pass_far_below_it(found):
-    edges = found[0]
-    assert (edges.first_pass > edges.limit).all()
-    assert (edges.steps_needed < 12 * edges.limit).all()
+    assert (found.first_pass > found.limit).all()
+    assert (found.steps_needed < 12 * found.limit).all()
+
+
+def test_numbers_stay_finite_where_the_energy_does_not(shards):
+    """Blowing up is not leaving the range of doubles: from 10⁰ to 10³⁰⁸ takes more steps than these have."""
+    edges = frontier.find(sweep.collect(each(shards), {"finite": 0.0, "energy": 0.05}))
+    assert np.isnan(edges.last_fail[:, 0]).all()
+    assert (edges.last_fail[:, 1] > 0).all()
 
 
 def test_the_gated_law_needs_more_steps(found):
     """The listings' drag in mid-air takes away what the scheme puts in."""
-    needed = found[0].steps_needed
-    assert (needed.isel(contact=1) > needed.isel(contact=0)).all()
+    needed = found.steps_needed
+    assert (needed.isel(contact=GATED) > needed.isel(contact=UNGATED)).all()
 
 
 def test_steps_grow_about_as_the_root_of_the_stiffness(found):
-    assert found[0].exponent.values == pytest.approx(0.5, abs=0.17)
+    assert found.exponent.values == pytest.approx(0.5, abs=0.2)
 
 
-def test_a_tolerance_from_the_study_is_used_and_stored(found):
-    _, lax, _ = found
-    assert lax.tolerance.values[0] == 1e6
-    assert np.isnan(lax.last_fail.values[:, 0]).all()
+def test_the_limit_is_where_omega_h_is_two(found):
+    np.testing.assert_allclose(found.limit, 10 * np.sqrt(4 * found.stiffness) / 2, rtol=1e-12)
 
 
-def test_a_run_that_left_the_numeric_range_fails_every_criterion(found):
-    collected = found[2].copy(deep=True)
-    collected["verdict"][:] = 5
-    assert np.isnan(frontier.find(collected, {}).first_pass).all()
+def test_edges_are_those_of_each_column(found, collected, plan):
+    for k, s, c in [(UNGATED, 0, ENERGY), (GATED, 3, APEX), (GATED, 4, ENERGY)]:
+        inside = (collected.contact.values == k) & (collected.stiffness.values == found.stiffness.values[s])
+        steps, failing = collected.steps.values[inside], collected.failing.values[c, inside]
+        assert found.last_fail[k, c, s] == steps[failing > 0].max()
+        assert found.first_pass[k, c, s] == steps[failing == 0].min()
 
 
-def test_the_scan_is_kept_with_its_edges(found):
-    edges, lax, collected = found
-    assert edges.cell_steps.values.tolist() == collected.steps.values.tolist()
-    failing = (collected.energy_ratio > 1.05).mean("member").values
-    np.testing.assert_allclose(edges.failing.values[0], failing, atol=1e-12)
-    assert not lax.failing.values[0].any()
+def test_a_tolerance_from_the_study_is_used_and_stored(lax):
+    edges = frontier.find(lax)
+    assert edges.tolerance.values.tolist() == [1e6, 0.02]
+    assert np.isnan(edges.last_fail.values[:, 0]).all()
+    assert (edges.last_fail.values[:, 1] > 0).all()
 
 
-def test_an_edge_at_the_end_of_its_scan_is_no_measurement(found):
-    collected = found[2]
+def test_the_scan_is_kept_with_its_edges(found, collected, plan):
+    assert found.cell_steps.values.tolist() == collected.steps.values.tolist()
+    passing = plan.members - collected.failing.values
+    np.testing.assert_array_equal(found.pass_fraction, passing / plan.members)
+    low, high = frontier.confidence(passing, plan.members)
+    np.testing.assert_array_equal(found.pass_fraction_low, low)
+    np.testing.assert_array_equal(found.pass_fraction_high, high)
+
+
+def test_an_edge_at_the_end_of_its_scan_is_no_measurement(collected):
     coarse = collected.isel(cell=collected.omega_h.values > 1.0)  # as written, members fail down to the last step
-    edges = frontier.find(coarse, {})
-    apex, last_fail = 1, 1
-    assert np.isfinite(edges.last_fail.values[1, apex]).all()
-    assert np.isnan(edges.exponent.values[1, apex, last_fail])
+    edges = frontier.find(coarse)
+    assert np.isfinite(edges.last_fail.values[GATED, APEX]).all()
+    assert np.isnan(edges.exponent.values[GATED, APEX, LAST_FAIL])
 
 
 def test_each_edge_has_its_own_fit(found):
-    edges = found[0]
     for e, name in enumerate(frontier.EDGES):
-        alone = frontier.power_law(edges.stiffness.values, edges[name].values[1, 0])
-        assert edges.exponent.values[1, 0, e] == alone["exponent"]
+        alone = frontier.power_law(found.stiffness.values, found[name].values[GATED, ENERGY])
+        for part in frontier.FIT:
+            np.testing.assert_equal(float(found[part][GATED, ENERGY, e]), alone[part])
 
 
 def test_the_table_has_a_line_for_each_point(found):
-    edges = found[0]
-    lines = frontier.table(edges).splitlines()
-    assert len(lines) == 1 + edges.first_pass.size
+    lines = frontier.table(found).splitlines()
+    assert len(lines) == 1 + found.first_pass.size
     assert lines[0].startswith("contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,first_pass")
-    law, criterion, tolerance, stiffness, limit, first, last, _, _, exponent, error = lines[1].split(",")
-    assert float(last) == edges.last_fail.values[0, 0, 0]
-    assert float(exponent) == pytest.approx(edges.exponent.values[0, 0, 1], abs=1e-4)
-    assert float(error) == pytest.approx(edges.exponent_error.values[0, 0, 1], abs=1e-4)
+    row = lines[1].split(",")
+    law, criterion, tolerance, stiffness, limit, first, last, _, _, exponent, error = row
+    assert float(last) == found.last_fail.values[UNGATED, ENERGY, 0]
+    assert float(exponent) == pytest.approx(found.exponent.values[UNGATED, ENERGY, LAST_FAIL], abs=1e-4)
+    assert float(error) == pytest.approx(found.exponent_error.values[UNGATED, ENERGY, LAST_FAIL], abs=1e-4)
     assert (law, criterion, float(tolerance), float(stiffness)) == ("ungated", "energy", 0.05, 100.0)
     assert float(limit) == 100.0
-    assert float(first) == edges.first_pass.values[0, 0, 0]
+    assert float(first) == found.first_pass.values[UNGATED, ENERGY, 0]

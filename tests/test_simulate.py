@@ -5,15 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from stiffdice.criteria import CRITERIA
 from stiffdice.ensemble import phased
 from stiffdice.errors import InputError
 from stiffdice.scene import Scene, from_mapping
 from stiffdice.simulate import default_every, simulate
+from stiffdice.state import Ensemble
 from stiffdice.verdict import Verdict
 
 
-def verdict(steps=1000, model="sliding", **keys):
-    return Verdict(simulate(from_mapping(keys), model=model, steps=steps).verdict[0])
+def verdict(steps=1000, model="sliding", every=None, **keys):
+    return Verdict(simulate(from_mapping(keys), model=model, steps=steps, every=every).verdict[0])
 
 
 @pytest.mark.parametrize(("steps", "every"), [(10_000, 7), (999, 1), (3, 2), (1, 1), (70_000, 10_000)])
@@ -41,6 +43,7 @@ def test_telling_progress_changes_nothing(every):
     told: list[float] = []
     quiet = simulate(Scene(), model="sliding", steps=300_000, every=every)
     loud = simulate(Scene(), model="sliding", steps=300_000, every=every, progress=told.append)
+    np.testing.assert_array_equal(quiet.steps_computed, loud.steps_computed)
     np.testing.assert_array_equal(quiet.end, loud.end)
     for name, value in quiet.measures.items():
         np.testing.assert_array_equal(value, loud.measures[name])
@@ -53,19 +56,30 @@ def test_telling_progress_changes_nothing(every):
 
 def test_an_ensemble_is_its_members_one_by_one():
     scene = Scene().with_ground(stiffness=1e5, contact="gated")
-    members = phased(scene, "sliding", 3000, 5)
-    together = simulate(scene, model="sliding", steps=3000, members=members)
+    launches, late = phased(scene, "sliding", 3000, 5)
+    together = simulate(scene, model="sliding", steps=3000, members=Ensemble(launches, late))
     for k in range(5):
-        alone = simulate(scene, model="sliding", steps=3000, members=members[k : k + 1])
+        one = Ensemble(launches[k : k + 1], late[k : k + 1])
+        alone = simulate(scene, model="sliding", steps=3000, members=one)
         assert alone.end[0] == together.end[k]
-        assert alone.measures["energy_ratio"][0] == together.measures["energy_ratio"][k]
+        for name, value in together.measures.items():
+            np.testing.assert_array_equal(alone.measures[name], value[k : k + 1], err_msg=name)
 
 
 def test_the_members_given_are_left_as_they_are():
     members = phased(Scene(), "sliding", 100, 3)
-    before = members.copy()
+    before = members.launches.copy(), members.late.copy()
     simulate(Scene(), model="tumbling", steps=100, members=members)
-    np.testing.assert_array_equal(members, before)
+    np.testing.assert_array_equal(members.launches, before[0])
+    np.testing.assert_array_equal(members.late, before[1])
+
+
+def test_an_ensemble_has_one_of_everything_for_each_member():
+    run = simulate(Scene(), model="sliding", steps=100, members=phased(Scene(), "sliding", 100, 3))
+    for values in (run.touchdown_phase, run.steps_done, run.steps_computed, run.verdict, *run.measures.values()):
+        assert values.shape == (3,)
+    assert run.decided.shape == (3, len(CRITERIA))
+    assert list(run.measures) == [part.MEASURE for part in CRITERIA.values()]
 
 
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
@@ -121,6 +135,44 @@ def test_a_tumbling_cube_may_rise_higher_than_before():
     assert Verdict(run.verdict[0]) == Verdict.PASSED
 
 
+def test_a_verdict_asks_the_criteria_it_is_given():
+    stiff = from_mapping({"ground": {"stiffness": 1e6}})
+
+    def ended(criteria):
+        return Verdict(simulate(stiff, model="sliding", steps=10_000, criteria=criteria).verdict[0])
+
+    assert ended(None) == Verdict.ENERGY_GREW
+    assert ended({"energy": 2.0}) == Verdict.PASSED
+    assert ended({"energy": 2.0, "apex": 0.02}) == Verdict.APEX_ROSE
+    assert ended({"energy": 2.0, "restitution": 0.05}) == Verdict.RESTITUTION_OFF
+    assert ended({}) == Verdict.PASSED
+
+
+def test_a_step_too_short_for_doubles_is_told():
+    """At 10²⁰ m from the origin the next place that a double knows is 16 km away."""
+    far = {"launch": {"position": [1e20, 0, 1e20], "velocity": [5, 0, 5]}, "ground": {"contact": "gated"}}
+    assert verdict(every=None, **far) == Verdict.STALLED
+    assert verdict(launch={"position": [0, 0, 3], "velocity": [0, 0, 0]}, gravity=0) == Verdict.PASSED
+    still = {"position": [0, 0, 3], "velocity": [0, 0, 0]}
+    assert verdict(launch=still, gravity=1e-12, duration=1.0) == Verdict.PASSED
+
+
+@pytest.mark.parametrize("every", [None, 1])
+def test_a_run_that_needs_more_steps_than_its_budget_is_undecided(every):
+    scene = Scene().with_ground(contact="gated")
+    whole = simulate(scene, model="sliding", steps=10_000, every=every)
+    needed = int(whole.steps_computed[0])
+    enough = simulate(scene, model="sliding", steps=10_000, every=every, budget=needed)
+    np.testing.assert_array_equal(enough.end, whole.end)
+    assert Verdict(enough.verdict[0]) == Verdict.PASSED
+    short = simulate(scene, model="sliding", steps=10_000, every=every, budget=needed - 1)
+    assert Verdict(short.verdict[0]) == Verdict.UNDECIDED
+    assert short.steps_computed[0] == needed - 1
+    assert short.steps_done[0] < 10_000
+    if every:
+        assert len(short.trajectory.time) == needed
+
+
 @pytest.mark.parametrize("steps", [0, -1, 1.5, float("nan"), "many", None, True, 2**53 + 2])
 def test_steps_are_a_whole_number(steps):
     with pytest.raises(InputError, match=r"steps = .*allowed is a whole number from 1 to 9007199254740992"):
@@ -134,6 +186,7 @@ def test_steps_are_a_whole_number(steps):
         ({"scheme": "magic"}, "scheme = magic: allowed is symplectic_euler"),
         ({"every": 0}, "every = 0"),
         ({"every": 101}, "every = 101: allowed is a whole number from 1 to 100"),
+        ({"criteria": {"beauty": 1}}, "criteria.beauty: unknown; allowed are finite, energy"),
         ({"steps": 10**9, "every": 1}, r"would keep 1000000001 samples .* allowed is 200 or more"),
     ],
 )

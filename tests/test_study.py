@@ -1,45 +1,63 @@
 from __future__ import annotations
 
+import inspect
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
-from stiffdice import study, theory
+from stiffdice import catalogue, study, theory
+from stiffdice.criteria import CRITERIA
 from stiffdice.errors import InputError
-from stiffdice.figures import DRAWINGS
+from stiffdice.grid import Column
 from stiffdice.models import MODELS
 from stiffdice.scene import PRESETS
 from stiffdice.schemes import SCHEMES
-from stiffdice.verdict import CRITERIA
 
 CONFIG = Path(__file__).parent.parent / "config"
+SWEEP = "sweeps.steps-needed"
+SCENE = "config/scenes/figure-13.yaml"
 
 
 @pytest.fixture(scope="module")
 def paper(study_schema):
-    return study.load(CONFIG / "paper.yaml", study_schema)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(CONFIG.parent)
+        return study.load(CONFIG / "paper.yaml", study_schema)
 
 
 @pytest.fixture
-def changed(tmp_path, monkeypatch, study_schema):
-    """Load config/quick.yaml with one key changed (None takes it away)."""
-    monkeypatch.chdir(CONFIG.parent)
+def changed(tmp_path, study_schema):
+    """Load config/quick.yaml with some keys changed (None takes one away)."""
 
-    def load(path, value):
+    def load(changes):
         data = yaml.safe_load((CONFIG / "quick.yaml").read_text())
-        *above, last = path.split(".")
-        part = data
-        for key in above:
-            part = part[key]
-        if value is None:
-            del part[last]
-        else:
-            part[last] = value
+        for path, value in changes.items():
+            *above, last = path.split(".")
+            part = data
+            for key in above:
+                part = part.setdefault(key, {})
+            if value is None:
+                del part[last]
+            else:
+                part[last] = value
         file = tmp_path / "quick.yaml"
         file.write_text(yaml.safe_dump(data))
         return study.load(file, study_schema)
+
+    return load
+
+
+@pytest.fixture
+def sweep_of(changed):
+    """The sweep of config/quick.yaml with some of its own keys changed."""
+
+    def load(**changes):
+        return changed({f"{SWEEP}.{key}": value for key, value in changes.items()}).sweeps["steps-needed"]
 
     return load
 
@@ -50,23 +68,25 @@ def _at_the_top(monkeypatch):
 
 
 def test_figure_13_is_the_sweep_that_was_promised(paper):
-    sweep = paper.sweep
-    cells = sweep.cells()
-    stiffness = sorted({cell.stiffness for cell in cells})
+    sweep = paper.sweeps["steps-needed"]
+    columns = sweep.columns()
+    stiffness = sorted({column.stiffness for column in columns})
     assert len(stiffness) >= 16
     assert (stiffness[0], stiffness[-1]) == (1e2, 1e7)
-    assert {cell.contact for cell in cells} == {"ungated", "gated"}
+    assert {column.contact for column in columns} == {"ungated", "gated"}
+    assert len(columns) == 2 * len(stiffness)
     assert sweep.members >= 32
-    for value in stiffness:
-        steps = [cell.steps for cell in cells if cell.stiffness == value and cell.contact == "gated"]
+    for column in columns:
+        steps = sweep.scan(column)
         assert len(set(steps)) >= 40
-        omega_h = [theory.omega_h(sweep.scene.with_ground(stiffness=value), n) for n in steps]
+        omega_h = [theory.omega_h(sweep.scene_of(column), n) for n in steps]
         assert min(omega_h) < 0.105
         assert max(omega_h) > 2.8
 
 
 def test_step_counts_favour_no_round_numbers(paper):
-    steps = np.array([cell.steps for cell in paper.sweep.cells() if cell.steps > 1000])
+    sweep = paper.sweeps["steps-needed"]
+    steps = np.array([n for column in sweep.columns() for n in sweep.scan(column) if n > 1000])
     assert np.mean(steps % 10 == 0) < 0.15
 
 
@@ -76,67 +96,192 @@ def test_every_figure_of_the_paper_is_planned(paper):
         assert paper.runs[paper.figures[f"figure-{number:02d}"].run].presets == ("as_listed", "as_written")
 
 
-def test_shards_share_out_all_cells_evenly(paper):
-    shards = paper.sweep.shards()
-    dealt = [cell for cells in shards.values() for cell in cells]
-    assert sorted(dealt) == sorted(paper.sweep.cells())
-    work = [sum(cell.steps for cell in cells) for cells in shards.values()]
-    assert max(work) < 1.2 * min(work)
+def test_a_column_is_run_on_its_own_ground(plan):
+    scene = plan.scene_of(Column("gated", 123.0))
+    assert (scene.ground.contact, scene.ground.stiffness) == ("gated", 123.0)
+    assert scene.launch == plan.scene.launch
 
 
-def test_a_shards_name_tells_what_it_computes(changed):
-    names = set(changed("sweep.seed", 1).sweep.shards())
-    assert names == set(changed("sweep.seed", 1).sweep.shards())
-    for path, value in (("sweep.seed", 2), ("sweep.members", 9), ("sweep.set", ["cube.mass=2"])):
-        assert names.isdisjoint(changed(path, value).sweep.shards())
-    # What is only judged or drawn from the shards leaves their names alone.
-    assert names == set(changed("criteria", {"energy": 0.5}).sweep.shards())
+def test_shards_share_out_all_columns_evenly(paper):
+    sweep = paper.sweeps["steps-needed"]
+    shards = sweep.shards()
+    dealt = [column for columns in shards.values() for column in columns]
+    assert sorted(dealt) == sorted(sweep.columns())
+    assert {len(columns) for columns in shards.values()} == {3}
+    # Work grows with the steps, and these with the root of the stiffness.
+    work = [sum(np.sqrt(column.stiffness) for column in columns) for columns in shards.values()]
+    assert max(work) < 6 * min(work)
 
 
-def test_a_stiffness_has_the_same_steps_in_another_grid(changed):
-    def steps(study):
-        return [cell.steps for cell in study.sweep.cells() if cell.stiffness == 1e4 and cell.contact == "gated"]
-
-    assert steps(changed("sweep.seed", 1)) == steps(changed("sweep.stiffness", {"from": 1e3, "to": 1e5, "count": 3}))
-
-
-def test_steps_may_be_counts_instead(changed):
-    quick = changed("sweep.seed", 1)
-    given = {"from": 100, "to": 200, "count": 10}
-    counted = changed("sweep", {**_sweep_of("quick"), "steps": given})
-    steps = {cell.steps for cell in counted.sweep.cells()}
-    assert min(steps) >= 100
-    assert max(steps) <= 200
-    assert quick.sweep.omega_h is not None
+@pytest.mark.parametrize("size", [1, 3, 4, 10, 1000])
+def test_every_column_is_in_one_shard_whatever_its_size(sweep_of, size):
+    sweep = sweep_of(columns_per_shard=size)
+    shards = list(sweep.shards().values())
+    assert max(map(len, shards)) <= size
+    assert sorted(column for columns in shards for column in columns) == sorted(sweep.columns())
 
 
-def _sweep_of(name):
-    sweep = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())["sweep"]
-    del sweep["omega_h"]
-    return sweep
+def names(sweep):
+    return set(sweep.shards())
+
+
+def test_a_shards_name_tells_what_it_computes(sweep_of):
+    before = names(sweep_of())
+    assert before == names(sweep_of())
+    for key, value in {
+        "seed": 2,
+        "members": 9,
+        "set": ["cube.mass=2"],
+        "refine": 2,
+        "early_stop": False,
+        "model": "tumbling",
+        "omega_h": {"from": 3, "to": 0.2, "count": 41},
+        "criteria": {"energy": 0.05, "trajectory": 0.1},
+    }.items():
+        assert before.isdisjoint(names(sweep_of(**{key: value}))), key
+
+
+@pytest.mark.parametrize(
+    ("early_stop", "refine", "kept"), [(False, 0, True), (True, 0, False), (False, 1, False), (True, 1, False)]
+)
+def test_another_tolerance_needs_other_runs_only_where_runs_depend_on_it(sweep_of, early_stop, refine, kept):
+    fixed = {"early_stop": early_stop, "refine": refine}
+    before = names(sweep_of(**fixed, criteria={"energy": 0.05, "apex": 0.02}))
+    for criteria in ({"energy": 0.05, "apex": 0.03}, {"energy": 0.05}):
+        after = names(sweep_of(**fixed, criteria=criteria))
+        assert (after == before) == kept
+        assert kept or after.isdisjoint(before)
+
+
+def test_a_horizon_matters_only_to_a_trajectory(sweep_of):
+    """And asking for one needs runs that are compared."""
+    free = {"early_stop": False, "refine": 0}
+    bounces, path = {"apex": 0.02}, {"apex": 0.02, "trajectory": 0.05}
+    assert names(sweep_of(**free, criteria=bounces)) == names(sweep_of(**free, criteria=bounces, horizon=3.0))
+    assert names(sweep_of(**free, criteria=path)).isdisjoint(names(sweep_of(**free, criteria=path, horizon=3.0)))
+    assert names(sweep_of(**free, criteria=path)).isdisjoint(names(sweep_of(**free, criteria=bounces)))
+
+
+def test_a_stiffness_has_the_same_steps_in_another_grid_and_under_either_law(sweep_of):
+    other = sweep_of(stiffness={"from": 1e3, "to": 1e5, "count": 3})
+    assert len({tuple(s.scan(Column(law, 1e4))) for s in (sweep_of(), other) for law in ("gated", "ungated")}) == 1
+
+
+def test_a_stiffness_may_be_one(sweep_of):
+    sweep = sweep_of(stiffness=300)
+    assert sweep.columns() == [Column("ungated", 300.0), Column("gated", 300.0)]
+
+
+def test_steps_may_be_counts_instead(sweep_of):
+    sweep = sweep_of(steps={"from": 100, "to": 200, "count": 10}, omega_h=None)
+    for column in sweep.columns():
+        assert 100 <= min(sweep.scan(column)) <= max(sweep.scan(column)) <= 200
+
+
+def test_criteria_are_the_studys_unless_the_sweep_has_its_own(changed):
+    assert changed({}).sweeps["steps-needed"].criteria == {"energy": 0.05, "apex": 0.02}
+    study_wide = changed({"criteria": {"apex": 0.5}})
+    assert study_wide.sweeps["steps-needed"].criteria == {"apex": 0.5}
+    own = changed({"criteria": {"apex": 0.5}, f"{SWEEP}.criteria": {"energy": 0.1}})
+    assert own.sweeps["steps-needed"].criteria == {"energy": 0.1}
+    turning = changed({"criteria": {"apex": 0.5, "energy": 0.1}, f"{SWEEP}.model": "tumbling"})
+    assert turning.sweeps["steps-needed"].criteria == {"energy": 0.1}
+
+
+def test_a_horizon_is_the_duration_unless_it_is_given(sweep_of):
+    assert sweep_of().horizon == 10.0
+    assert sweep_of(set=["duration=4"]).horizon == 4.0
+    assert sweep_of(horizon=2.5).horizon == 2.5
+
+
+# How many of 8 members pass, at ascending steps.
+SCANNED = [100, 200, 400, 800, 1600, 3200]
+COLUMN = Column("gated", 1e4)
+
+
+@pytest.mark.parametrize(
+    ("passing", "expected"),
+    [
+        ([0, 0, 0, 8, 8, 8], [(400, 800)]),
+        ([0, 8, 0, 8, 8, 8], [(100, 200), (200, 400), (400, 800)]),
+        ([0, 0, 3, 8, 8, 8], [(200, 400), (400, 800)]),
+        ([3, 3, 3, 3, 3, 3], list(itertools.pairwise(SCANNED))),
+        ([0, 0, 0, 0, 0, 7], [(1600, 3200)]),
+        ([8, 8, 8, 8, 8, 8], []),
+        ([0, 0, 0, 0, 0, 0], []),
+    ],
+)
+def test_a_scan_is_refined_where_neighbours_disagree_or_are_mixed(plan, passing, expected):
+    added = plan.finer(COLUMN, SCANNED, np.array([passing]) / 8, 1)
+    assert len(added) == len(expected)
+    for steps, (low, high) in zip(added, expected, strict=True):
+        assert low < steps < high
+
+
+def test_one_criterion_in_doubt_is_enough(plan):
+    shares = np.array([[0, 0, 0, 1, 1, 1], [0, 0, 0, 0, 0, 1]])
+    added = plan.finer(COLUMN, SCANNED, shares, 1)
+    assert [sum(low < steps for low in SCANNED) - 1 for steps in added] == [2, 4]
+
+
+def test_finer_is_jittered_by_column_round_and_seed_and_by_nothing_else(plan, sweep_of):
+    shares = np.array([[0, 1, 0, 1, 0, 1]])
+    wide = [1000 * steps for steps in SCANNED]
+    first = plan.finer(COLUMN, wide, shares, 1)
+    assert first == plan.finer(COLUMN, wide, shares, 1)
+    assert first == plan.finer(Column("ungated", 1e4), wide, shares, 1)
+    assert set(first).isdisjoint(plan.finer(COLUMN, wide, shares, 2))
+    assert set(first).isdisjoint(plan.finer(Column("gated", 1e5), wide, shares, 1))
+    assert set(first).isdisjoint(sweep_of(seed=2).finer(COLUMN, wide, shares, 1))
+
+
+@given(st.lists(st.integers(0, 8), min_size=1, max_size=12), st.integers(1, 5))
+def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
+    """Neighbours next to each other leave no room: nothing is added there, and nothing twice."""
+    scanned = list(range(7, 7 + len(passing)))
+    assert plan.finer(COLUMN, scanned, np.array([passing]) / 8, rounds) == []
+    spread = [n * n for n in scanned]
+    added = plan.finer(COLUMN, spread, np.array([passing]) / 8, rounds)
+    assert added == sorted(set(added) - set(spread))
+    assert all(spread[0] < steps < spread[-1] for steps in added)
 
 
 @pytest.mark.parametrize(
     ("path", "value", "told"),
     [
-        ("sweep.members", 0, "sweep.members = 0: allowed is a whole number from 1"),
-        ("sweep.members", "many", "sweep.members = many: allowed is a whole number"),
-        ("sweep.members", None, "sweep.members is missing"),
-        ("sweep.membrs", 3, "sweep.membrs: unknown key; allowed are"),
-        ("sweep.steps", {"from": 1, "to": 2, "count": 1}, "sweep: give one of steps and omega_h"),
-        ("sweep.omega_h", None, "sweep: give one of steps and omega_h"),
-        ("sweep.stiffness.from", -1, "sweep.stiffness.from = -1: allowed is a finite number > 0"),
-        ("sweep.stiffness.from", float("nan"), "sweep.stiffness.from = nan: allowed is a finite number"),
-        ("sweep.stiffness.to", float("inf"), "sweep.stiffness.to = inf: allowed is a finite number > 0"),
-        ("sweep.stiffness.count", 0, "sweep.stiffness.count = 0"),
-        ("sweep.contact", ["sticky"], "sweep.contact.0 = sticky: allowed is ungated or gated"),
-        ("sweep.contact", [], "sweep.contact = []"),
-        ("sweep.model", "falling", "sweep.model = falling: allowed is sliding or tumbling"),
-        ("sweep.scene", "nowhere.yaml", "nowhere.yaml: No such file"),
-        ("sweep.set", ["ground.S=1"], "ground.S"),
-        ("sweep.set", ["launch.position=[0, 0, 0.1]"], "sweep: members = 8: they are spread over the phase"),
-        ("criteria", {"energy": -1}, "criteria.energy = -1: allowed is a number from 0 to 1e6"),
-        ("criteria", {"beauty": 1}, "criteria.beauty: unknown key; allowed are energy, apex"),
+        (f"{SWEEP}.members", 0, f"{SWEEP}.members = 0: allowed is a whole number from 1"),
+        (f"{SWEEP}.members", "many", f"{SWEEP}.members = many: allowed is a whole number"),
+        (f"{SWEEP}.members", None, f"{SWEEP}.members is missing"),
+        (f"{SWEEP}.membrs", 3, f"{SWEEP}.membrs: unknown key; allowed are"),
+        (f"{SWEEP}.steps", {"from": 1, "to": 2, "count": 1}, f"{SWEEP}: give one of steps and omega_h"),
+        (f"{SWEEP}.omega_h", None, f"{SWEEP}: give one of steps and omega_h"),
+        (f"{SWEEP}.stiffness", -1, f"{SWEEP}.stiffness = -1: allowed is a finite number > 0 [kg/s²], or {{from"),
+        (f"{SWEEP}.stiffness.from", -1, "allowed is a finite number > 0"),
+        (f"{SWEEP}.stiffness.from", float("nan"), f"{SWEEP}.stiffness.from = nan: allowed is a finite number"),
+        (f"{SWEEP}.stiffness.to", float("inf"), "allowed is a finite number > 0"),
+        (f"{SWEEP}.omega_h.to", float("inf"), f"{SWEEP}.omega_h.to = inf: allowed is a finite number > 0"),
+        (f"{SWEEP}.omega_h.count", 0, f"{SWEEP}.omega_h.count = 0: allowed is a whole number from 1"),
+        (f"{SWEEP}.contact", ["sticky"], f"{SWEEP}.contact.0 = sticky: allowed is ungated or gated"),
+        (f"{SWEEP}.contact", [], f"{SWEEP}.contact = []"),
+        (f"{SWEEP}.contact", "gated", f"{SWEEP}.contact = gated: allowed is a list of different contact laws"),
+        (f"{SWEEP}.model", "falling", f"{SWEEP}.model = falling: allowed is sliding or tumbling"),
+        (f"{SWEEP}.scene", "nowhere.yaml", "nowhere.yaml: No such file"),
+        (f"{SWEEP}.set", ["ground.S=1"], "ground.S"),
+        (f"{SWEEP}.set", ["ground.stiffness=3"], "the sweep sets this itself, from its key stiffness"),
+        (f"{SWEEP}.set", ["ground.contact=gated"], "the sweep sets this itself, from its key contact"),
+        (f"{SWEEP}.set", ["launch.position=[0, 0, 0.1]"], f"{SWEEP}: members = 8: they are spread over the phase"),
+        (f"{SWEEP}.omega_h.to", 1e-300, f"{SWEEP}: omega_h: asks for up to"),
+        (f"{SWEEP}.refine", 21, f"{SWEEP}.refine = 21: allowed is a whole number from 0 to 20"),
+        (f"{SWEEP}.refine", -1, f"{SWEEP}.refine = -1: allowed is a whole number from 0 to 20"),
+        (f"{SWEEP}.early_stop", 3, f"{SWEEP}.early_stop = 3: allowed is true or false"),
+        (f"{SWEEP}.horizon", 11, f"{SWEEP}: horizon = 11: allowed is a number <= duration = 10 [s]"),
+        (f"{SWEEP}.horizon", 0, f"{SWEEP}.horizon = 0: allowed is a finite number > 0 [s]"),
+        (f"{SWEEP}.columns_per_shard", 0, f"{SWEEP}.columns_per_shard = 0: allowed is a whole number from 1"),
+        (f"{SWEEP}.criteria", {"energy": -1}, f"{SWEEP}.criteria.energy = -1: allowed is a number from 0 to 1e6"),
+        (f"{SWEEP}.criteria", {"beauty": 1}, f"{SWEEP}: criteria.beauty: unknown; allowed are finite, energy, apex"),
+        (f"{SWEEP}.criteria", {}, f"{SWEEP}.criteria = {{}}: allowed are criteria, each with its tolerance"),
+        ("sweeps.Steps", {}, "sweeps.Steps"),
+        ("criteria", {"beauty": 1}, "criteria.beauty: unknown; allowed are finite, energy, apex"),
         ("question", "", "question = "),
         ("question", None, "question is missing"),
         ("dpi", 5, "dpi = 5: allowed is a whole number from 50 to 1200"),
@@ -145,33 +290,121 @@ def _sweep_of(name):
         ("runs.figure-04.presets", ["corrected"], "state cube.inertia"),
         ("runs.Figure 4", {"scene": "x", "model": "sliding", "steps": 1}, "Figure 4"),
         ("figures.energy.run", "figure-99", "figures.energy.run = figure-99: allowed is figure-04 or figure-09"),
-        (
-            "figures.energy.draw",
-            "cube-start",
-            "figures.energy.run = figure-09: cube-start needs a run of model tumbling",
-        ),
-        ("figures.energy.draw", "poetry", "figures.energy.draw = poetry: allowed is"),
-        ("sweep", None, "figures.frontier: frontier draws a sweep"),
-        ("figures.frontier.run", "figure-04", "figures.frontier.run = figure-04: frontier draws the sweep"),
+        ("figures.energy.run", None, "figures.energy.run = nothing: allowed is figure-04 or figure-09"),
+        ("figures.energy.of", ["steps-needed"], "figures.energy.of: energy draws a run; name it with `run`"),
+        ("figures.energy.draw", "cube-start", "figure-09: cube-start needs a run of model tumbling"),
+        ("figures.frontier.run", "figure-04", "figure-04: frontier draws sweeps; name them with `of`"),
+        ("figures.frontier.of", ["other"], "figures.frontier.of = other: allowed is steps-needed"),
+        ("figures.frontier.of", None, "figures.frontier.of is missing: frontier needs the names of sweeps"),
+        ("figures.frontier.of", [], "figures.frontier.of = []: allowed is a list of different names"),
+        ("sweeps", None, "figures.frontier.of = steps-needed: allowed is none: this study has no sweeps"),
         ("figures.Big Figure", {"draw": "frontier", "title": "x"}, "figures.Big Figure: allowed names have small"),
-        ("sweep.omega_h.to", 1e-300, "sweep.omega_h: asks for up to"),
-        ("sweep.set", ["ground.stiffness=3"], "the sweep sets this itself, from sweep.stiffness"),
-        ("sweep.contact", "gated", "sweep.contact = gated: allowed is a list of different contact laws"),
+        (
+            "tables.t",
+            {"tell": "answers", "of": ["other"], "title": "x"},
+            "tables.t.of = other: allowed is steps-needed",
+        ),
+        ("tables.t", {"tell": "answers", "title": "x"}, "tables.t.of is missing"),
+        ("tables.t", {"tell": "answers", "of": [], "title": "x"}, "tables.t.of = []: allowed is a list"),
     ],
 )
 def test_bad_studies_end_with_one_line(changed, path, value, told):
     with pytest.raises(InputError) as caught:
-        changed(path, value)
+        changed({path: value})
     assert told in str(caught.value)
     assert "quick.yaml: " in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
+ROCKING = {"measure": "rocking", "scene": SCENE}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"measure": "beauty"}, f"measure = beauty: allowed is {' or '.join(catalogue.EXPERIMENTS)}"),
+        ({"scene": "nowhere.yaml"}, "nowhere.yaml: No such file"),
+        ({"set": ["cube.mass=-1"]}, "cube.mass = -1"),
+        ({"options": {"stepz": 3}}, "options.stepz: unknown key; allowed are"),
+        ({"options": {"steps": "many"}}, "options.steps = many: allowed is a whole number"),
+        ({"options": {"steps": 0}}, "options.steps = 0: allowed is a whole number from 1"),
+        ({"options": {"zeta": 0.3}}, "options.zeta = 0.3: allowed is a list of numbers"),
+        ({"options": {"zeta": []}}, "options.zeta = []: allowed is a list of numbers"),
+        ({"options": {"zeta": [0.1, "x"]}}, "options.zeta = the text 'x': allowed is a finite number >= 0"),
+    ],
+)
+def test_bad_experiments_end_with_one_line(changed, change, told):
+    with pytest.raises(InputError) as caught:
+        changed({"experiments.rock": ROCKING | change})
+    assert told in str(caught.value).partition("quick.yaml: experiments.rock: ")[2]
+    assert "\n" not in str(caught.value)
+
+
+def test_an_experiment_is_planned_with_its_options(changed):
+    options = {"zeta": [0.0, 0.5], "steps": 200}
+    planned = changed({"experiments.rock": ROCKING | {"set": ["cube.mass=2"], "options": options}}).experiments["rock"]
+    assert planned == ("rocking", SCENE, ("cube.mass=2",), options)
+
+
+def test_a_figure_shows_only_experiments_of_its_kind(changed):
+    both = {"experiments.rock": ROCKING, "figures.x": {"draw": "rocking", "of": ["rock"], "title": "x"}}
+    assert changed(both).figures["x"] == ("rocking", None, ("rock",), "x")
+    both["figures.x"] = {"draw": "ledger", "of": ["rock"], "title": "x"}
+    with pytest.raises(InputError, match=r"figures.x.of = rock: ledger shows only experiments that measure ledger"):
+        changed(both)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "allowed"),
+    [
+        ({"figures.x": {"draw": "poetry", "run": "figure-04", "title": "x"}}, "figures.x.draw", catalogue.DRAWINGS),
+        ({"tables.x": {"tell": "poetry", "of": ["steps-needed"], "title": "x"}}, "tables.x.tell", catalogue.TABLES),
+    ],
+)
+def test_a_name_that_is_in_no_registry_is_told_with_those_that_are(changed, changes, key, allowed):
+    with pytest.raises(InputError) as caught:
+        changed(changes)
+    assert str(caught.value).endswith(f"quick.yaml: {key} = poetry: allowed is {' or '.join(allowed)}")
+
+
+ENTRIES = {
+    f"{kind} {name}": entry
+    for kind, registry in (
+        ("drawing", catalogue.DRAWINGS),
+        ("table", catalogue.TABLES),
+        ("experiment", catalogue.EXPERIMENTS),
+    )
+    for name, entry in registry.items()
+}
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_everything_in_the_catalogue_is_there(name):
+    """And takes what its registry says: data and a title, or a scene and options, each with a default."""
+    parameters = list(inspect.signature(ENTRIES[name].load()).parameters.values())
+    if name.startswith("experiment"):
+        assert parameters[0].name == "scene"
+        options = parameters[1:]
+        assert all(part.kind is part.KEYWORD_ONLY for part in options)
+        assert all(part.default is not part.empty for part in options)
+    else:
+        assert len(parameters) == 2
+        assert parameters[1].name == "title"
+
+
+def test_what_a_drawing_shows_can_be_had():
+    for entry in [*catalogue.DRAWINGS.values(), *catalogue.TABLES.values()]:
+        assert entry.given in ("runs", "sweeps", "experiments")
+        assert (entry.measures in catalogue.EXPERIMENTS) == (entry.given == "experiments")
+
+
 def test_the_schema_knows_what_the_code_knows(study_schema):
+    """What it enumerates; drawings, tables, experiments and criteria are looked up when a study is read."""
     schema = yaml.safe_load(study_schema.read_text())
-    kinds, parts = schema["$defs"], schema["properties"]
+    kinds = schema["$defs"]
     assert kinds["model"]["enum"] == list(MODELS)
     assert kinds["scheme"]["enum"] == list(SCHEMES)
     assert kinds["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
-    assert list(parts["criteria"]["properties"]) == list(CRITERIA)
-    assert parts["figures"]["additionalProperties"]["properties"]["draw"]["enum"] == list(DRAWINGS)
+    text = study_schema.read_text()
+    for registry in (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, CRITERIA):
+        assert not [name for name in registry if f" {name}," in text or f"[{name}" in text]

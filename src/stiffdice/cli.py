@@ -77,6 +77,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         metavar="K",
         help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
     )
+    run.add_argument(
+        "--ledger",
+        action="store_true",
+        help="book where the energy goes, for every bounce and for the run (takes some times as long)",
+    )
     run.add_argument("--preset", metavar="P", help="as_listed, as_written or corrected: defaults of the physics")
     run.add_argument(
         "--set",
@@ -127,6 +132,7 @@ def _run(options: argparse.Namespace) -> None:
         raise InputError(f"{target}: is the scene itself; name another file for the output")
 
     # These take about a second to import; bad input is told before.
+    from stiffdice import ledger
     from stiffdice.io.layout import run_dataset
     from stiffdice.io.write import write_dataset
     from stiffdice.progress import Progress
@@ -143,7 +149,11 @@ def _run(options: argparse.Namespace) -> None:
             every=every,
             progress=progress.show,
         )
-    write_dataset(run_dataset(run), target)
+    dataset = run_dataset(run)
+    if options.ledger:
+        books = ledger.keep(scene, model=options.model, scheme=options.scheme, steps=steps)
+        dataset = dataset.assign(ledger.variables(books))
+    write_dataset(dataset, target)
     print(f"{target}: {Verdict(run.verdict[0]).sentence}")
 
 

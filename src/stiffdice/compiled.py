@@ -54,12 +54,17 @@ _FOLDER = str(_cache_folder())
 os.environ["NUMBA_CACHE_DIR"] = _FOLDER
 
 import numba  # noqa: E402
-from numba import njit  # noqa: E402
 from numba.extending import overload  # noqa: E402
 
 setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
 
-__all__ = ["by_tag", "njit"]
+
+def njit(*function: Any, **options: Any) -> Any:
+    """Compile a function as numba's decorator does, with division by zero giving infinity or not-a-number.
+
+    At the extremes a step, a stiffness or a weight may leave the range of doubles; that is a result, not an error.
+    """
+    return numba.njit(*function, error_model="numpy", **options)
 
 
 def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:

@@ -70,6 +70,16 @@ def speed_of(physics: Any, state: Any) -> float:
 
 
 @njit
+def lowest_of(physics: Any, state: Any) -> float:
+    """Return how far below the centre the lowest node is [m]."""
+    lowest = physics.reach
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        lowest = min(lowest, physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2])
+    return -lowest
+
+
+@njit
 def node_force(law: Any, physics: Any, depth: float, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
     """Return the force on one node [N]: its weight, the normal force and friction, added in the listings' order.
 

@@ -19,13 +19,22 @@ from stiffdice import scene as scenes
 from stiffdice.io import layout
 from stiffdice.io.enums import enum_attributes, meanings_of
 from stiffdice.provenance import code_digest
-from stiffdice.verdict import Verdict, criteria_of
 
 # What a scan has edges of, and what they are.
 EDGES = {
     "first_pass": "fewest steps at which every member passes",
     "last_fail": "most steps at which a member still fails",
     "steps_needed": "fewest scanned steps from which on every member passes",
+}
+
+# A power law through an edge, and how sure it is.
+FIT = {
+    "exponent": "exponent of the power law",
+    "exponent_error": "standard error of it",
+    "factor": "steps at stiffness 1 kg s-2 by the power law",
+    "scatter": "standard deviation of log10 of the steps about the power law",
+    "centre": "geometric mean of the stiffnesses in the fit",
+    "points": "number of stiffnesses in the fit",
 }
 
 Values = npt.NDArray[np.float64]
@@ -47,35 +56,64 @@ def edges(steps: npt.NDArray[np.int64], passes: npt.NDArray[np.bool_]) -> dict[s
 
 
 def power_law(stiffness: Values, steps: Values) -> dict[str, float]:
-    """Return exponent, its standard error and the factor of steps = factor · stiffness^exponent.
+    """Return the power law steps = factor · stiffness^exponent through points, and how sure it is.
 
-    Least squares in the logarithms, over the points that are there; NaN with fewer than three of them.
+    Least squares in the logarithms (base 10), over the points that are there: `exponent` and its standard error,
+    `factor`, `scatter` (standard deviation of the residuals), `centre` (geometric mean of the stiffnesses) and
+    `points`. NaN with fewer than three points.
     """
     known = np.isfinite(steps)
-    if np.count_nonzero(known) < 3:
-        return {"exponent": np.nan, "exponent_error": np.nan, "factor": np.nan}
+    count = np.count_nonzero(known)
+    if count < 3:
+        return dict.fromkeys(FIT, np.nan) | {"points": float(count)}
     x, y = np.log10(stiffness[known]), np.log10(steps[known])
     centred = x - x.mean()
     slope = float(centred @ y / (centred @ centred))
     residual = y - y.mean() - slope * centred
-    error = float(np.sqrt(residual @ residual / (len(x) - 2) / (centred @ centred)))
-    return {"exponent": slope, "exponent_error": error, "factor": float(10 ** (y.mean() - slope * x.mean()))}
+    scatter = float(np.sqrt(residual @ residual / (count - 2)))
+    return {
+        "exponent": slope,
+        "exponent_error": scatter / float(np.sqrt(centred @ centred)),
+        "factor": float(10 ** (y.mean() - slope * x.mean())),
+        "scatter": scatter,
+        "centre": float(10 ** x.mean()),
+        "points": float(count),
+    }
 
 
-def find(sweep: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
-    """Return the frontier of a collected sweep: dimensions contact, criterion, stiffness; and the scan, dimension cell.
+def band(fit: Mapping[str, float], stiffness: Values) -> tuple[Values, Values]:
+    """Return the steps between which a power law lies by two standard errors, shape of `stiffness` each.
 
-    tolerances: by criterion; the others keep their defaults.
+    The textbook's confidence band of a regression line: scatter·√(1/n + (x − x̄)²/Σ(x − x̄)²) in the logarithm.
     """
-    criteria = criteria_of(sweep.attrs["model"])
-    used = {name: tolerances.get(name, criterion.tolerance) for name, criterion in criteria.items()}
-    finite = sweep.verdict.values != Verdict.LEFT_NUMERIC_RANGE
-    holds = np.stack([finite & part.holds(sweep[part.measure].values, used[name]) for name, part in criteria.items()])
+    away = np.log10(stiffness / fit["centre"])
+    width = 2 * np.sqrt(fit["scatter"] ** 2 / fit["points"] + (fit["exponent_error"] * away) ** 2)
+    middle = np.log10(fit["factor"]) + fit["exponent"] * np.log10(stiffness)
+    return 10 ** (middle - width), 10 ** (middle + width)
+
+
+def confidence(passing: npt.NDArray[np.int64], members: int) -> tuple[Values, Values]:
+    """Return Wilson's 95 % interval of a share of which `passing` of `members` passed, shape of `passing` each.
+
+    Wilson (1927), doi:10.1080/01621459.1927.10502953. It takes members for random draws; ours are spread evenly, so
+    that the interval is rather too wide.
+    """
+    z = 1.959963984540054
+    share = passing / members
+    middle = (share + z * z / (2 * members)) / (1 + z * z / members)
+    width = z * np.sqrt(share * (1 - share) / members + z * z / (4 * members**2)) / (1 + z * z / members)
+    # Round-off must not leave the share itself outside.
+    return np.clip(middle - width, 0.0, share), np.clip(middle + width, share, 1.0)
+
+
+def find(sweep: xr.Dataset) -> xr.Dataset:
+    """Return the frontier of a collected sweep by contact law, criterion and stiffness; and the scan, by cell."""
+    criteria = meanings_of(sweep.criterion)
     laws, stiffnesses = np.unique(sweep.contact.values), np.unique(sweep.stiffness.values)
     shape = (len(laws), len(criteria), len(stiffnesses))
     found = {name: np.full(shape, np.nan) for name in (*EDGES, "flips")}
-    fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in ("exponent", "exponent_error", "factor")}
-    passes = np.asarray(holds.all(axis=-1))
+    fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in FIT}
+    passes = sweep.failing.values == 0
     for k, law in enumerate(laws):
         for c in range(len(criteria)):
             inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
@@ -90,76 +128,50 @@ def find(sweep: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
                 measured = np.where(inside[e], found[edge][k, c], np.nan)
                 for name, value in power_law(stiffnesses, measured).items():
                     fits[name][k, c, e] = value
-    return _dataset(sweep, laws, stiffnesses, used, found, fits, 1 - holds.mean(axis=-1))
+    return _dataset(sweep, laws, stiffnesses, found, fits)
 
 
 def _dataset(
     sweep: xr.Dataset,
     laws: npt.NDArray[np.int8],
     stiffnesses: Values,
-    tolerances: Mapping[str, float],
     found: Mapping[str, Values],
     fits: Mapping[str, Values],
-    failing: Values,
 ) -> xr.Dataset:
     grid = ("contact", "criterion", "stiffness")
-    per_edge = ("contact", "criterion", "edge")
     scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
     limits = [theory.steps_for(scene.with_ground(stiffness=value), theory.STABILITY_LIMIT) for value in stiffnesses]
-    variables: dict[str, Any] = {
-        name: (grid, found[name], {"long_name": meaning, "units": "1"}) for name, meaning in EDGES.items()
+    members = int(sweep.attrs["members"])
+    passing = members - sweep.failing.values.astype(np.int64)
+    low, high = confidence(passing, members)
+    scan = ("criterion", "cell")
+    described: dict[str, tuple[Any, Any, str]] = {
+        **{name: (grid, found[name], meaning) for name, meaning in EDGES.items()},
+        "flips": (grid, found["flips"], "changes between pass and fail along the scan"),
+        "limit": ("stiffness", limits, "steps at the linear stability limit, omega h = 2"),
+        "pass_fraction": (scan, passing / members, "share of a cell's members that pass the criterion"),
+        "pass_fraction_low": (scan, low, "lower end of its 95 % confidence interval"),
+        "pass_fraction_high": (scan, high, "upper end of its 95 % confidence interval"),
+        "tolerance": ("criterion", sweep.tolerance.values, "tolerance of the criterion"),
+        **{name: ((*grid[:2], "edge"), fits[name], meaning) for name, meaning in FIT.items()},
     }
-    variables |= {
-        "flips": (
-            grid,
-            found["flips"],
-            {"long_name": "changes between pass and fail along the scan", "units": "1"},
-        ),
-        "limit": (
-            "stiffness",
-            limits,
-            {"long_name": "steps at the linear stability limit, omega h = 2", "units": "1"},
-        ),
-        "failing": (
-            ("criterion", "cell"),
-            failing,
-            {"long_name": "share of a cell's members that fail the criterion", "units": "1"},
-        ),
-        "tolerance": (
-            "criterion",
-            list(tolerances.values()),
-            {"long_name": "tolerance of the criterion", "units": "1"},
-        ),
-        "exponent": (per_edge, fits["exponent"], {"long_name": "exponent of the power law", "units": "1"}),
-        "exponent_error": (
-            per_edge,
-            fits["exponent_error"],
-            {"long_name": "standard error of it", "units": "1"},
-        ),
-        "factor": (
-            per_edge,
-            fits["factor"],
-            {"long_name": "steps at stiffness 1 kg s-2 by the power law", "units": "1"},
-        ),
+    variables: dict[str, Any] = {
+        name: (dims, values, {"long_name": meaning, "units": "kg s-2" if name == "centre" else "1"})
+        for name, (dims, values, meaning) in described.items()
     }
     coordinates: dict[str, Any] = {
         "contact": ("contact", laws, layout.CONTACT_ATTRIBUTES),
-        "criterion": (
-            "criterion",
-            np.arange(len(tolerances), dtype=np.int8),
-            enum_attributes("criterion", list(tolerances)),
-        ),
+        "criterion": ("criterion", sweep.criterion.values, sweep.criterion.attrs),
         "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum_attributes("edge of a criterion", list(EDGES))),
-        "stiffness": ("stiffness", stiffnesses, {"long_name": "ground stiffness", "units": "kg s-2"}),
+        "stiffness": ("stiffness", stiffnesses, layout.CELL_ATTRIBUTES["stiffness"]),
     }
     coordinates |= {
         f"cell_{name}": ("cell", sweep[name].values, sweep[name].attrs)
         for name in ("contact", "stiffness", "steps", "omega_h")
     }
-    attributes = {key: value for key, value in sweep.attrs.items() if key != "verdict_criteria"} | {
+    attributes = sweep.attrs | {
         "title": "Edges of stability",
         "stiffdice_version": __version__,
-        "members": sweep.sizes["member"],
         "analysis_code_digest": code_digest("stiffdice.frontier"),
     }
     return xr.Dataset(variables, coordinates, attributes)

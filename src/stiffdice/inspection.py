@@ -23,6 +23,8 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
     if "scene" in attributes:
         scene = yaml.safe_dump(json.loads(attributes["scene"]), sort_keys=False, default_flow_style=None, width=100)
         lines += ["", "scene", *(f"  {line}" for line in scene.splitlines())]
+    if "scheme_work" in dataset:
+        lines += ["", "energy ledger of the run", *_ledger(dataset)]
     lines += ["", "variables", *_variables(dataset)]
     return "\n".join(lines)
 
@@ -41,10 +43,20 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
         measures = [
             f"  {name} = {float(variable):.6g}: {variable.attrs['long_name']}"
             for name, variable in dataset.data_vars.items()
-            if variable.ndim == 0 and str(name).endswith(("_ratio", "_phase"))
+            if variable.ndim == 0 and str(name).endswith(("_ratio", "_error", "_phase"))
         ]
         return [f"  {dataset.attrs.get('verdict_text', next(iter(counts)))}", *measures]
     return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
+
+
+# Of a run's ledger, in this order.
+_BOOKED = ("launch_energy", "damping_work", "drag_work", "friction_work", "scheme_work", "end_energy")
+
+
+def _ledger(dataset: xr.Dataset) -> list[str]:
+    """Return where the energy of a run went, a line each."""
+    lines = [f"  {name:14} {float(dataset[name]):+12.6g} J" for name in _BOOKED]
+    return [*lines, f"  in {int(dataset.bounce_count)} bounces and the flights between them"]
 
 
 def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, measures, schemes
+from stiffdice import checks, schemes, watch
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
+from stiffdice.criteria import MEMORY, limits_of, open_of, tolerances_of, values
+from stiffdice.criteria import observe as criteria_observe
+from stiffdice.criteria import start as criteria_start
 from stiffdice.energy import energies
 from stiffdice.errors import InputError
+from stiffdice.flight import free_steps
+from stiffdice.judge import judge
 from stiffdice.models import MODELS
+from stiffdice.reference import none
 from stiffdice.scene import Scene
-from stiffdice.state import STATE, Array, Physics, States, physics_of, start_of
-from stiffdice.verdict import judge
+from stiffdice.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
+from stiffdice.verdict import Verdict
+from stiffdice.watch import SIGHT
 
 LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
@@ -50,16 +57,23 @@ class Trajectory:
 class Run:
     """One run, or an ensemble of them.
 
-    measures: values by name, shape (member,). steps_done: int64 (member,), fewer than `steps` where the numbers left
-    the range of doubles. verdict: int8 (member,), a `Verdict`. end: the last state, shape (member, ...).
+    tolerances: of the criteria the run was asked. measures: values by name, shape (member,). steps_done: int64
+    (member,): fewer than `steps` where the run was stopped, all being decided, or left the range of doubles.
+    decided: int64 (member, criterion), the step that decided a criterion, in the registry's order; 0 if none did before
+    the end. steps_computed: int64 (member,), those not skipped as free flight. verdict: int8 (member,), a `Verdict`.
+    end: the last state, shape (member, ...).
     """
 
     scene: Scene
     model: str
     scheme: str
     steps: int
+    tolerances: dict[str, float]
     measures: dict[str, Array]
+    touchdown_phase: Array
     steps_done: npt.NDArray[np.int64]
+    decided: npt.NDArray[np.int64]
+    steps_computed: npt.NDArray[np.int64]
     verdict: npt.NDArray[np.int8]
     end: States
     trajectory: Trajectory | None
@@ -77,20 +91,31 @@ def simulate(
     scheme: str = "symplectic_euler",
     steps: int = 10_000,
     every: int | None = None,
-    members: States | None = None,
+    members: Ensemble | None = None,
+    criteria: Mapping[str, float] | None = None,
+    stop: Mapping[str, float] | None = None,
+    references: npt.NDArray[np.void] | None = None,
+    budget: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Run the simulator and return what happened.
 
-    every: keep every K-th state, from the launch on; None keeps none. members: the launches of an ensemble, shape
-    (member, ...) each; None runs the scene's own launch. progress: called with the fraction done, some times a second.
+    every: keep every K-th state, from the launch on; None keeps none, and takes free flights in one step each, which
+    agrees with stepping to round-off. members: the launches of an ensemble; None runs the scene's own launch.
+    criteria: tolerances of those that the verdict asks; None asks the default ones. stop: end a run as soon as all of
+    these criteria are decided at these tolerances. references: what `trajectory` compares with, one for all or one for
+    each member (`reference.make`). budget: most steps to compute one by one; a run that needs more ends undecided.
+    progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, and a trajectory too large to hold.
     """
     checks.choice("model", model, MODELS)
     checks.choice("scheme", scheme, schemes.SCHEMES)
     steps = checks.count("steps", steps)
-    ensemble = start_of(scene, model) if members is None else members.copy()
+    tolerances = tolerances_of(model, criteria)
+    alone = Ensemble(start_of(scene, model), np.zeros(1))
+    launches, late = alone if members is None else members
+    ensemble = launches.copy()
     count = len(ensemble)
     if every is not None:
         every = checks.count("every", every, at_most=steps)
@@ -100,33 +125,67 @@ def simulate(
     physics = physics_of(scene)
     tags = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
     h = scene.duration / steps
-    memory = np.zeros(count, measures.MEMORY)
-    steps_done = np.zeros(count, np.int64)
+    most = steps if budget is None else budget
+    watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((2, count), np.int64))
+    watched.memory["limits"] = limits_of({} if stop is None else stop)
     if every is not None:
         samples[0] = ensemble[0]
+    _begin(physics, ensemble, watched.memory, watched.sight, h, late, schemes.LAGS[scheme])
 
-    stop, chunk = 0, steps if progress is None else 20_000
-    while stop < steps:
-        first, stop = stop, min(steps, stop + chunk)
+    reached, chunk = 0, steps if progress is None else 20_000
+    while reached < steps:
         begun = time.perf_counter()
-        _march(*tags, physics, ensemble, memory, steps_done, first, stop, h, every or 0, samples)
+        reached = min(steps, reached + chunk)
+        _march(
+            *tags,
+            physics,
+            ensemble,
+            watched.memory,
+            watched.sight,
+            watched.steps_done,
+            watched.steps_computed,
+            none() if references is None else references,
+            reached,
+            steps,
+            h,
+            most,
+            every or 0,
+            samples,
+        )
         if progress is not None:
-            progress(stop / steps)
+            progress(reached / steps)
             chunk = int(chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))) + 1
 
-    found = measures.values(memory)
-    finite = steps_done == steps
+    found = values(watched.memory)
+    endings = {
+        Verdict.SANK: _sunk(physics, ensemble),
+        Verdict.STALLED: _stalled(scene, launches, ensemble, watched.steps_done == steps),
+        Verdict.UNDECIDED: (watched.steps_done < steps) & (watched.steps_computed >= most),
+    }
     return Run(
         scene,
         model,
         scheme,
         steps,
+        tolerances,
         found,
-        steps_done,
-        judge(model, found, finite, _sunk(physics, ensemble)),
+        watched.sight["touchdown_phase"].copy(),
+        watched.steps_done,
+        watched.memory["decided"].copy(),
+        watched.steps_computed,
+        judge(tolerances, found, endings),
         ensemble,
-        None if every is None else _trajectory(scene, physics, samples, every, steps, int(steps_done[0])),
+        None if every is None else _trajectory(scene, physics, samples, every, steps, int(watched.steps_done[0])),
     )
+
+
+class Watched(NamedTuple):
+    """What a kernel keeps of each member besides its state; first dimension member."""
+
+    memory: npt.NDArray[np.void]
+    sight: npt.NDArray[np.void]
+    steps_done: npt.NDArray[np.int64]
+    steps_computed: npt.NDArray[np.int64]
 
 
 def _room_for(steps: int, every: int | None) -> States:
@@ -140,6 +199,22 @@ def _room_for(steps: int, every: int | None) -> States:
 
 
 @njit(cache=True)
+def _begin(
+    physics: Physics,
+    ensemble: States,
+    memory: npt.NDArray[np.void],
+    sight: npt.NDArray[np.void],
+    h: float,
+    late: Array,
+    lag: float,
+) -> None:
+    """Let everything that watches a run look at its launch."""
+    for m in range(ensemble.shape[0]):
+        watch.start(sight[m], physics, ensemble[m], h, late[m], lag)
+        criteria_start(memory[m], sight[m], physics, ensemble[m])
+
+
+@njit(cache=True)
 def _march(
     scheme: Any,
     model: Any,
@@ -147,44 +222,53 @@ def _march(
     physics: Physics,
     ensemble: States,
     memory: npt.NDArray[np.void],
+    sight: npt.NDArray[np.void],
     steps_done: npt.NDArray[np.int64],
-    start: int,
+    steps_computed: npt.NDArray[np.int64],
+    references: npt.NDArray[np.void],
     stop: int,
+    steps: int,
     h: float,
+    budget: int,
     every: int,
     samples: States,
 ) -> None:
-    """Advance every member from step `start` to step `stop`, watching each step and keeping every K-th."""
+    """Advance every member to step `stop`, watching each step and keeping every K-th.
+
+    Between samples nothing is skipped; without samples, free flight is taken in one step, past `stop` if it is longer,
+    so that where to stop changes nothing.
+    """
     for m in range(ensemble.shape[0]):
-        if steps_done[m] != start:
-            continue  # it left the numeric range in an earlier chunk
-        state = ensemble[m]
-        watch = memory[m]
-        if start == 0:
-            measures.start(watch, physics, state, h)
-        until_kept = every - start % every if every > 0 else -1
-        done = start
-        for i in range(start + 1, stop + 1):
-            schemes.step(scheme, model, law, physics, state, h)
-            if not _is_finite(state):
+        state, seen, remembered = ensemble[m], sight[m], memory[m]
+        reference = references[m % references.shape[0]]
+        undecided = open_of(remembered)
+        done = steps_done[m]
+        until_kept = every - done % every if every > 0 else -1
+        while done < stop and undecided > 0 and remembered.finite[0] == 0.0:
+            flown = 0
+            if every == 0:
+                most = steps - done
+                if reference.horizon >= seen.time:  # it is compared at least as often as the reference is known
+                    most = min(most, 1 + int(reference.spacing / h))
+                flown = free_steps(model, law, physics, state, seen, most)
+            if flown > 0:
+                schemes.flight(scheme, model, physics, state, h, flown)
+            elif steps_computed[m] >= budget:
                 break
-            done = i
-            measures.observe(watch, physics, state, h)
+            else:
+                schemes.step(scheme, model, law, physics, state, h)
+                steps_computed[m] += 1
+            step = done + max(1, flown)
+            watch.observe(seen, physics, state, step, flown)
+            undecided -= criteria_observe(remembered, step, seen, law, physics, state, reference)
+            if remembered.finite[0] > 0.0:
+                break
+            done = step
             until_kept -= 1
             if until_kept == 0:
                 until_kept = every
-                samples[i // every] = state
+                samples[step // every] = state
         steps_done[m] = done
-
-
-@njit
-def _is_finite(state: Any) -> bool:
-    """Return whether the state's places and momenta are all finite numbers."""
-    total = 0.0
-    for axis in range(3):
-        total += abs(state.position[axis]) + abs(state.velocity[axis]) + abs(state.angular_momentum[axis])
-        total += abs(state.node_offset[0, axis])  # a spin past range turns all nodes into not-a-number
-    return total < math.inf
 
 
 def _sunk(physics: Physics, ensemble: States) -> npt.NDArray[np.bool_]:
@@ -193,6 +277,14 @@ def _sunk(physics: Physics, ensemble: States) -> npt.NDArray[np.bool_]:
     with np.errstate(all="ignore"):  # a run that blew up has infinite heights
         heights = (ensemble["position"][:, None, :] + ensemble["node_offset"]) @ normal
     return np.asarray((heights < 0).all(axis=1))
+
+
+def _stalled(scene: Scene, launches: States, ensemble: States, whole: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return whether a cube never moved although its speed says it should have, shape (member,)."""
+    still = (launches["position"] == ensemble["position"]).all(axis=1)
+    with np.errstate(all="ignore"):  # a run that blew up has infinite speeds
+        way = np.abs(ensemble["velocity"]).max(axis=1) * scene.duration
+    return np.asarray(whole & still & (way > 1e-6 * scene.cube.radius))
 
 
 def _trajectory(scene: Scene, physics: Physics, samples: States, every: int, steps: int, steps_done: int) -> Trajectory:

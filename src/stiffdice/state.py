@@ -46,6 +46,8 @@ class Physics(NamedTuple):
     node_weight: float  # [N]
     weight: float  # [N] of all nodes, summed one by one as the listings sum forces
     reach: float  # [m] no node is farther from the centre
+    radius: float  # [m] the cube's nominal one
+    side: float  # [m]
 
 
 def physics_of(scene: Scene) -> Physics:
@@ -68,6 +70,8 @@ def physics_of(scene: Scene) -> Physics:
         weight=weight,
         # The margin covers what rotating the nodes step by step can add in round-off.
         reach=float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6),
+        radius=scene.cube.radius,
+        side=scene.cube.side,
     )
 
 
@@ -87,6 +91,13 @@ def start_of(scene: Scene, model: str) -> States:
             state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
     state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
     return state
+
+
+class Ensemble(NamedTuple):
+    """The launches of members, and how late [s] each enters the scene's flight; shape (member,) each."""
+
+    launches: States
+    late: Array
 
 
 def rotated(offsets: Array, rotation: Array) -> Array:

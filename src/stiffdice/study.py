@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import inspect
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from stiffdice import checks, theory
+from stiffdice import catalogue, checks
 from stiffdice import scene as scenes
-from stiffdice.ensemble import phased
+from stiffdice.criteria import tolerances_of
+from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError
+from stiffdice.grid import Sweep
 from stiffdice.io import yaml_file
-from stiffdice.scene import Scene
-
-
-class Cell(NamedTuple):
-    """One point of a sweep, with all its members."""
-
-    contact: str
-    stiffness: float  # [kg/s²]
-    steps: int
+from stiffdice.state import TURNING
 
 
 class PlannedRun(NamedTuple):
@@ -43,79 +34,21 @@ class PlannedRun(NamedTuple):
     every: int
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """A grid of stiffness and steps, in shards."""
+class Experiment(NamedTuple):
+    """One question that is no sweep: what to measure (a name of `experiments.EXPERIMENTS`), of which scene, and how."""
 
-    scene: Scene
-    model: str
-    scheme: str
-    contact: tuple[str, ...]
-    stiffness: Mapping[str, float]
-    steps: Mapping[str, float] | None
-    omega_h: Mapping[str, float] | None
-    members: int
-    seed: int
-    cells_per_shard: int
-
-    def scene_of(self, cell: Cell) -> Scene:
-        """Return the sweep's scene on the ground of a cell."""
-        return self.scene.with_ground(contact=cell.contact, stiffness=cell.stiffness)
-
-    def cells(self) -> list[Cell]:
-        """Return all cells: contact law by law, stiffness by stiffness, steps ascending."""
-        return [
-            Cell(contact, stiffness, steps)
-            for contact in self.contact
-            for stiffness in dict.fromkeys(_geometric(self.stiffness))
-            for steps in self._steps_of(stiffness)
-        ]
-
-    @property
-    def _grid(self) -> Mapping[str, float]:
-        """The span of steps, given as counts or as ωh."""
-        grid = self.omega_h if self.steps is None else self.steps
-        assert grid is not None, "the schema asks for one of them"
-        return grid
-
-    def step_range(self, stiffness: float) -> tuple[float, float]:
-        """Return the fewest and the most steps of the grid at one stiffness [kg/s²], not rounded."""
-        ends = self._grid
-        if self.steps is None:
-            scene = self.scene.with_ground(stiffness=stiffness)
-            ends = {end: theory.steps_for(scene, ends[end]) for end in ("from", "to")}
-        return min(ends["from"], ends["to"]), max(ends["from"], ends["to"])
-
-    def _steps_of(self, stiffness: float) -> list[int]:
-        """Return the step counts tried at one stiffness: spread evenly in their logarithm, jittered within each part.
-
-        Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
-        """
-        low, high = np.log(self.step_range(stiffness))
-        count = int(self._grid["count"])
-        key = int.from_bytes(hashlib.sha256(repr(stiffness).encode()).digest()[:8])
-        part = (np.arange(count) + np.random.default_rng([self.seed, key]).random(count)) / count
-        return sorted({max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)})
-
-    def shards(self) -> dict[str, list[Cell]]:
-        """Return the cells of each shard, by the shard's id: a digest of all that its numbers depend on but the code.
-
-        Cells are dealt out in turn, so that every shard gets its share of the expensive ones.
-        """
-        cells = self.cells()
-        count = -(-len(cells) // self.cells_per_shard)
-        return {self._digest(cells[k::count]): cells[k::count] for k in range(count)}
-
-    def _digest(self, cells: Sequence[Cell]) -> str:
-        parts = [self.scene.digest, self.model, self.scheme, self.members, cells]
-        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
+    measure: str
+    scene: str
+    changes: tuple[str, ...]
+    options: dict[str, Any]
 
 
 class PlannedFigure(NamedTuple):
-    """One figure: what to draw (a name of `figures.DRAWINGS`), of which run (none for the sweep's)."""
+    """One figure: what to draw (a name of `figures.DRAWINGS`), of which run, or of which sweeps and experiments."""
 
     draw: str
     run: str | None
+    of: tuple[str, ...]
     title: str
 
 
@@ -126,9 +59,10 @@ class Study:
     name: str
     question: str
     runs: Mapping[str, PlannedRun]
-    sweep: Sweep | None
-    tolerances: Mapping[str, float]
+    sweeps: Mapping[str, Sweep]
+    experiments: Mapping[str, Experiment]
     figures: Mapping[str, PlannedFigure]
+    tables: Mapping[str, PlannedFigure]
     dpi: int
 
 
@@ -149,9 +83,10 @@ def load(path: str | Path, schema: str | Path) -> Study:
             name=Path(path).stem,
             question=data["question"],
             runs={name: _planned_run(name, run) for name, run in data.get("runs", {}).items()},
-            sweep=_sweep(data["sweep"]) if "sweep" in data else None,
-            tolerances=data.get("criteria", {}),
+            sweeps={name: _sweep(name, part, data.get("criteria")) for name, part in data.get("sweeps", {}).items()},
+            experiments={name: _experiment(name, part) for name, part in data.get("experiments", {}).items()},
             figures={name: _planned_figure(name, part, data) for name, part in data.get("figures", {}).items()},
+            tables={name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()},
             dpi=int(data.get("dpi", 150)),
         )
     except InputError as error:
@@ -220,53 +155,125 @@ def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
 
 
 def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
-    planned = PlannedFigure(figure["draw"], figure.get("run"), figure["title"])
-    if planned.draw == "frontier":
-        if "sweep" not in data:
-            raise InputError(f"figures.{name}: frontier draws a sweep, and this study has none")
+    planned = PlannedFigure(figure["draw"], figure.get("run"), tuple(figure.get("of", ())), figure["title"])
+    checks.choice(f"figures.{name}.draw", planned.draw, catalogue.DRAWINGS)
+    drawing = catalogue.DRAWINGS[planned.draw]
+    if drawing.given != "runs":
         if planned.run is not None:
-            raise InputError(f"figures.{name}.run = {planned.run}: frontier draws the sweep; leave `run` out")
-    elif planned.run not in data.get("runs", {}):
-        allowed = " or ".join(data.get("runs", {})) or "none: this study has no runs"
-        raise InputError(f"figures.{name}.run = {planned.run}: allowed is {allowed}")
-    elif planned.draw.startswith(("cube", "animation")) and data["runs"][planned.run]["model"] != "tumbling":
+            raise InputError(
+                f"figures.{name}.run = {planned.run}: {planned.draw} draws {drawing.given}; name them with `of`"
+            )
+        return _checked_sources(f"figures.{name}", planned, drawing, data)
+    if planned.of:
+        raise InputError(f"figures.{name}.of: {planned.draw} draws a run; name it with `run`")
+    _known(f"figures.{name}.run", planned.run, data.get("runs", {}), "runs")
+    if planned.draw.startswith(("cube", "animation")) and data["runs"][planned.run]["model"] not in TURNING:
         raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
     return planned
 
 
-def _sweep(sweep: Mapping[str, Any]) -> Sweep:
+def _planned_table(name: str, table: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
+    planned = PlannedFigure(table["tell"], None, tuple(table["of"]), table["title"])
+    checks.choice(f"tables.{name}.tell", planned.draw, catalogue.TABLES)
+    return _checked_sources(f"tables.{name}", planned, catalogue.TABLES[planned.draw], data)
+
+
+def _checked_sources(
+    where: str, planned: PlannedFigure, entry: catalogue.Entry, data: Mapping[str, Any]
+) -> PlannedFigure:
+    """Return the plan; raises InputError unless it names sweeps or experiments that the study has."""
+    if not planned.of:
+        raise InputError(f"{where}.of is missing: {planned.draw} needs the names of {entry.given}")
+    for source in planned.of:
+        _known(f"{where}.of", source, data.get(entry.given, {}), entry.given)
+        if entry.measures and data[entry.given][source]["measure"] != entry.measures:
+            raise InputError(
+                f"{where}.of = {source}: {planned.draw} shows only experiments that measure {entry.measures}"
+            )
+    return planned
+
+
+def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> None:
+    if name not in names:
+        allowed = " or ".join(names) or f"none: this study has no {kind}"
+        raise InputError(f"{where} = {checks.shown(name)}: allowed is {allowed}")
+
+
+def _experiment(name: str, experiment: Mapping[str, Any]) -> Experiment:
+    planned = Experiment(
+        experiment["measure"],
+        experiment["scene"],
+        tuple(experiment.get("set", ())),
+        dict(experiment.get("options", {})),
+    )
+    try:
+        checks.choice("measure", planned.measure, catalogue.EXPERIMENTS)
+        scenes.load(planned.scene, planned.changes)
+        parameters = inspect.signature(catalogue.EXPERIMENTS[planned.measure].load()).parameters.values()
+        known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
+        checks.known_keys("options", planned.options, known)
+        for key, value in planned.options.items():
+            _same_kind(f"options.{key}", value, known[key])
+    except InputError as error:
+        raise error.within(f"experiments.{name}") from None
+    return planned
+
+
+def _same_kind(key: str, value: object, default: object) -> None:
+    """Raise InputError unless an option's value is of the kind that its default is."""
+    if isinstance(default, str):
+        if not isinstance(value, str):
+            raise InputError(f"{key} = {checks.shown(value)}: allowed is a word, as {default}")
+    elif isinstance(default, int):
+        checks.count(key, value)
+    elif isinstance(default, float):
+        checks.number(key, value, "", at_least=0)
+    else:
+        if not isinstance(value, list) or not value:
+            raise InputError(f"{key} = {checks.shown(value)}: allowed is a list of numbers")
+        for part in value:
+            checks.number(key, part, "", at_least=0)
+
+
+def _sweep(name: str, sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
+    try:
+        return _checked_sweep(sweep, sweep.get("criteria", criteria))
+    except InputError as error:
+        raise error.within(f"sweeps.{name}") from None
+
+
+def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
+    scene = scenes.load(sweep["scene"], sweep.get("set", ()))
+    stiffness = sweep["stiffness"]
     planned = Sweep(
-        scenes.load(sweep["scene"], sweep.get("set", ())),
+        scene,
         sweep["model"],
         sweep.get("scheme", "symplectic_euler"),
         tuple(sweep["contact"]),
-        sweep["stiffness"],
+        stiffness if isinstance(stiffness, Mapping) else {"from": stiffness, "to": stiffness, "count": 1},
         sweep.get("steps"),
         sweep.get("omega_h"),
         int(sweep["members"]),
         int(sweep.get("seed", 0)),
-        int(sweep.get("cells_per_shard", 500)),
+        int(sweep.get("refine", 0)),
+        tolerances_of(sweep["model"], criteria),
+        bool(sweep.get("early_stop", True)),
+        float(sweep.get("horizon", scene.duration)),
+        int(sweep.get("columns_per_shard", 4)),
     )
+    if not planned.criteria:
+        raise InputError(f"criteria: none of them means anything for model {planned.model}")
+    if planned.horizon > scene.duration:
+        raise InputError(f"horizon = {planned.horizon:g}: allowed is a number <= duration = {scene.duration:g} [s]")
     for key in ("stiffness", "contact"):
         for override in sweep.get("set", ()):
             if override.split("=")[0].strip() == f"ground.{key}":
-                raise InputError(f"sweep.set: {override}: the sweep sets this itself, from sweep.{key}")
+                raise InputError(f"set: {override}: the sweep sets this itself, from its key {key}")
     most = max(planned.step_range(planned.stiffness[end])[1] for end in ("from", "to"))
     if not most <= checks.LARGEST_COUNT:
         key = "steps" if planned.steps else "omega_h"
-        raise InputError(f"sweep.{key}: asks for up to {most:.3g} steps; allowed are {checks.LARGEST_COUNT}")
-    longest = min(planned.cells(), key=lambda cell: cell.steps)
-    try:
-        phased(planned.scene_of(longest), planned.model, longest.steps, planned.members)
-    except InputError as error:
-        raise error.within("sweep") from None
+        raise InputError(f"{key}: asks for up to {most:.3g} steps; allowed are {checks.LARGEST_COUNT}")
+    longest = min((planned.scan(column)[0], column) for column in planned.columns())
+    launches = turned(scene, planned.model, planned.members)
+    phased(planned.scene_of(longest[1]), planned.model, longest[0], planned.members, launches)
     return planned
-
-
-def _geometric(span: Mapping[str, float]) -> list[float]:
-    """Return `count` values from `from` to `to`, evenly spaced in their logarithm, the ends exact.
-
-    Rounded to twelve digits: 1000, not 999.9999999999998, names a cell.
-    """
-    values = np.geomspace(span["from"], span["to"], int(span["count"]))
-    return [float(f"{value:.12g}") for value in values]

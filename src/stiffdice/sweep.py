@@ -1,97 +1,242 @@
-"""Many runs: compute the cells of a shard, collect shards into one sweep."""
+"""Many runs: compute the columns of a shard, collect shards into one sweep of judged cells."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
-from stiffdice import theory
+from stiffdice import criteria, theory
 from stiffdice.contact import LAWS
-from stiffdice.ensemble import phased
+from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError
+from stiffdice.fine import references
+from stiffdice.grid import Column, Sweep
 from stiffdice.io import layout
-from stiffdice.measures import MEASURES
+from stiffdice.io.spool import CHUNK_CELLS, CHUNK_MEMBERS, Spool
+from stiffdice.provenance import code_digest
+from stiffdice.scene import Scene
 from stiffdice.simulate import Run, simulate
-from stiffdice.study import Cell, Sweep
+from stiffdice.state import TURNING
+from stiffdice.verdict import Verdict
+
+Flags = npt.NDArray[np.bool_]
+
+# What a shard keeps of each run besides the measures.
+_OF_RUNS = ("touchdown_phase", "verdict", "steps_done", "steps_computed", "decided")
+
+# Members computed together: their references are in memory together.
+BLOCK = CHUNK_MEMBERS
 
 
-def compute(sweep: Sweep, cells: Sequence[Cell], progress: Callable[[float], None] | None = None) -> xr.Dataset:
-    """Return one shard: each cell's measures and verdicts, dimensions cell and member.
+def compute(
+    sweep: Sweep, columns: Sequence[Column], path: str | Path, progress: Callable[[float], None] | None = None
+) -> None:
+    """Compute one shard and store it: each run's measures and verdict, dimensions cell and member.
 
-    progress: called after every cell with the fraction of the shard's time steps done.
+    What is in memory at a time is a block of members and a scan's passing shares, whatever the size of the sweep.
+    progress: called after every round of a scan with about the fraction of the work done.
     """
-    cost = np.cumsum([cell.steps for cell in cells])
-    runs = []
-    for cell, done in zip(cells, cost, strict=True):
-        runs.append(_run(sweep, cell))
-        if progress is not None:
-            progress(float(done / cost[-1]))
-    return _dataset(sweep, cells, runs)
+    weight = np.cumsum([np.sqrt(column.stiffness) for column in columns])
+    with Spool(path, _pattern(sweep)) as spool:
+        for k, column in enumerate(columns):
+            _compute_column(sweep, column, spool)
+            if progress is not None:
+                progress(float(weight[k] / weight[-1]))
 
 
-def _run(sweep: Sweep, cell: Cell) -> Run:
-    scene = sweep.scene_of(cell)
-    members = phased(scene, sweep.model, cell.steps, sweep.members)
-    return simulate(scene, model=sweep.model, scheme=sweep.scheme, steps=cell.steps, members=members)
+def _compute_column(sweep: Sweep, column: Column, spool: Spool) -> None:
+    """Scan a column, and again where members do not agree, as often as the sweep asks."""
+    scanned: list[int] = []
+    passing = np.empty((len(sweep.criteria), 0))
+    due = sweep.scan(column)
+    for rounds in range(sweep.refine + 1):
+        if rounds:
+            due = sweep.finer(column, scanned, passing, rounds)
+        if not due:
+            return
+        shares = _compute_cells(sweep, column, due, spool)
+        order = np.argsort([*scanned, *due], kind="stable")
+        passing = np.concatenate([passing, shares], axis=1)[:, order]
+        scanned = [[*scanned, *due][index] for index in order]
 
 
-def _dataset(sweep: Sweep, cells: Sequence[Cell], runs: Sequence[Run]) -> xr.Dataset:
-    table = ("cell", "member")
-    measures = {name: np.stack([run.measures[name] for run in runs]) for name in MEASURES}
-    variables: dict[str, Any] = layout.measure_variables(measures, table)
-    variables["verdict"] = (table, np.stack([run.verdict for run in runs]), layout.VERDICT_ATTRIBUTES)
-    variables["steps_done"] = (
-        table,
-        np.stack([run.steps_done for run in runs]),
-        {"long_name": "steps within double range", "units": "1"},
+def _compute_cells(sweep: Sweep, column: Column, scan: Sequence[int], spool: Spool) -> npt.NDArray[np.float64]:
+    """Run all members at each number of steps, store them, and return the share that pass, shape (criterion, scan)."""
+    scene = sweep.scene_of(column)
+    first = spool.add_cells(len(scan))
+    spool.put(_cell_values(sweep, column, scan), slice(first, first + len(scan)))
+    failing = np.zeros((len(sweep.criteria), len(scan)))
+    launches = turned(scene, sweep.model, sweep.members)
+    for start in range(0, sweep.members, BLOCK):
+        block = slice(start, min(start + BLOCK, sweep.members))
+        compared = None
+        if "trajectory" in sweep.criteria:
+            distinct = launches[block] if sweep.model in TURNING else launches[:1]
+            compared, _ = references(scene, sweep.model, sweep.scheme, distinct, sweep.horizon)
+        for batch in range(0, len(scan), CHUNK_CELLS):
+            runs = [_run(sweep, scene, steps, launches, block, compared) for steps in scan[batch : batch + CHUNK_CELLS]]
+            cells = slice(first + batch, first + batch + len(runs))
+            spool.put(_run_values(runs), cells, block)
+            for k, run in enumerate(runs):
+                failing[:, batch + k] += (~passes(sweep.criteria, run.measures)).sum(axis=-1)
+    return 1 - failing / sweep.members
+
+
+def _run(
+    sweep: Sweep,
+    scene: Scene,
+    steps: int,
+    launches: npt.NDArray[np.void],
+    block: slice,
+    compared: npt.NDArray[np.void] | None,
+) -> Run:
+    return simulate(
+        scene,
+        model=sweep.model,
+        scheme=sweep.scheme,
+        steps=steps,
+        members=phased(scene, sweep.model, steps, sweep.members, launches, block),
+        criteria=sweep.criteria,
+        stop=sweep.criteria if sweep.early_stop else None,
+        references=compared,
     )
-    names = list(LAWS)
-    omega_h = [theory.omega_h(sweep.scene_of(cell), cell.steps) for cell in cells]
-    coordinates = {
-        "contact": (
-            "cell",
-            np.array([names.index(cell.contact) for cell in cells], np.int8),
-            layout.CONTACT_ATTRIBUTES,
-        ),
-        "stiffness": (
-            "cell",
-            [cell.stiffness for cell in cells],
-            {"long_name": "ground stiffness", "units": "kg s-2"},
-        ),
-        "steps": (
-            "cell",
-            [cell.steps for cell in cells],
-            {"long_name": "number of time steps", "units": "1"},
-        ),
-        "omega_h": (
-            "cell",
-            omega_h,
-            {"long_name": "contact frequency of a flat landing times step size", "units": "1"},
-        ),
-        "member": (
-            "member",
-            np.arange(sweep.members, dtype=np.int32),
-            {"long_name": "member: number k of n is launched k/n of a time step late", "units": "1"},
-        ),
+
+
+def passes(tolerances: Mapping[str, float], measures: Mapping[str, npt.ArrayLike]) -> Flags:
+    """Return whether each criterion asked holds, shape (criterion, ...) before the shape of the measures.
+
+    None holds where a number left the range of doubles.
+    """
+    inside = np.asarray(measures["out_of_range"]) == 0
+    return np.stack(
+        [
+            inside & criteria.holds(name, measures[criteria.CRITERIA[name].MEASURE], tolerance)
+            for name, tolerance in tolerances.items()
+        ]
+    )
+
+
+def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str, Any]:
+    scene = sweep.scene_of(column)
+    return {
+        "contact": np.full(len(scan), list(LAWS).index(column.contact), np.int8),
+        "stiffness": np.full(len(scan), column.stiffness),
+        "steps": np.array(scan, np.int64),
+        "omega_h": np.array([theory.omega_h(scene, steps) for steps in scan]),
     }
-    attributes = layout.provenance_attributes(
-        "Sweep of stiffness and steps", sweep.scene, sweep.model, sweep.scheme, "stiffdice.sweep"
-    )
+
+
+def _run_values(runs: Sequence[Run]) -> dict[str, Any]:
+    """Return what is kept of the runs of some cells by name, shape (cell, member, ...)."""
+    measures = {name: np.stack([run.measures[name] for run in runs]) for name in runs[0].measures}
+    return measures | {name: np.stack([getattr(run, name) for run in runs]) for name in _OF_RUNS}
+
+
+def _pattern(sweep: Sweep) -> xr.Dataset:
+    """Return an empty cell with all names, types, units and attributes of a shard."""
+    column = sweep.columns()[0]
+    runs = layout.run_variables(sweep.members)
+    member = np.arange(sweep.members, dtype=np.int32)
+    coordinates = {
+        name: ("cell", value, layout.CELL_ATTRIBUTES[name]) for name, value in _cell_values(sweep, column, [1]).items()
+    } | {
+        "member": ("member", member, layout.MEMBER_ATTRIBUTES),
+        "criterion": ("criterion", np.arange(len(criteria.CRITERIA), dtype=np.int8), layout.CRITERION_ATTRIBUTES),
+    }
+    attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
+    return xr.Dataset(runs, coordinates, attributes)
+
+
+def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
+    attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, "stiffdice.sweep")
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
-    return xr.Dataset(variables, coordinates, attributes)
+    attributes["early_stop"] = int(sweep.early_stop)
+    if sweep.early_stop:  # otherwise the measures hold for any tolerances
+        attributes["criteria"] = layout.criteria_text(sweep.criteria)
+    if "trajectory" in sweep.criteria:
+        attributes["horizon"] = sweep.horizon
+        attributes["horizon_units"] = "s"
+    return attributes
 
 
-def collect(shards: Sequence[xr.Dataset]) -> xr.Dataset:
-    """Return all shards as one dataset, cells sorted by contact law, stiffness and steps.
+# Cells of a shard to read at a time while collecting.
+AT_ONCE = 4 * CHUNK_CELLS
 
-    Raises InputError if the shards were not made from the same scene by the same code.
+
+def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.Dataset:
+    """Return all cells of all shards, judged: how many members fail each criterion, and the worst of each measure.
+
+    parts: shards, or AT_ONCE cells of one at a time (`io.read.parts`): what is in memory then does not grow with them.
+    Cells are sorted by contact law, stiffness and steps. Raises InputError if the shards were not made from the same
+    scene by the same code.
     """
-    for key in shards[0].attrs:
-        if any(str(shard.attrs.get(key)) != str(shards[0].attrs[key]) for shard in shards):
-            raise InputError(f"shards differ in {key}; they are not of one sweep")
-    whole = xr.concat(shards, dim="cell", data_vars="all", coords="different", compat="equals", join="exact")
+    judged: list[xr.Dataset] = []
+    for part in parts:
+        judged.append(_judged(part, tolerances))
+        ours, others = judged[-1].attrs, judged[0].attrs
+        differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
+        if differing:
+            raise InputError(f"shards differ in {', '.join(differing)}; they are not of one sweep")
+    whole = xr.concat(judged, dim="cell", data_vars="minimal", coords="different", compat="equals", join="exact")
     order = np.lexsort([whole[key].values for key in ("steps", "stiffness", "contact")])
-    return whole.isel(cell=order)
+    whole = whole.isel(cell=order)
+    whole.attrs = judged[0].attrs | {
+        "title": "Sweep of stiffness and steps",
+        "judging_code_digest": code_digest("stiffdice.sweep"),
+    }
+    return whole
+
+
+def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
+    """Return cells with what their members add up to."""
+    measures = {part.MEASURE: runs[part.MEASURE].values for part in criteria.CRITERIA.values()}
+    verdicts = runs["verdict"].values
+    counts = np.stack([(verdicts == verdict).sum(axis=1) for verdict in Verdict], axis=1)
+    asked = list(tolerances)
+    variables: dict[str, Any] = {
+        "failing": (
+            ("criterion", "cell"),
+            (~passes(tolerances, measures)).sum(axis=-1).astype(np.int32),
+            {"long_name": "number of members that fail the criterion", "units": "1"},
+        ),
+        "verdicts": (
+            ("cell", "verdict"),
+            counts.astype(np.int32),
+            {"long_name": "number of members that ended with a verdict", "units": "1"},
+        ),
+        "steps_computed": (
+            "cell",
+            runs["steps_computed"].values.sum(axis=1),
+            {"long_name": "steps computed one by one, of all members", "units": "1"},
+        ),
+        "tolerance": (
+            "criterion",
+            list(tolerances.values()),
+            {"long_name": "tolerance of the criterion", "units": "1"},
+        ),
+    } | {
+        f"largest_{name}": (
+            "cell",
+            _largest(measures[name]),
+            {"long_name": f"of all members: {layout.MEASURE_ATTRIBUTES[name]['long_name']}", "units": "1"},
+        )
+        for name in (criteria.CRITERIA[criterion].MEASURE for criterion in asked)
+    }
+    coordinates: dict[str, Any] = {
+        name: ("cell", runs[name].values, layout.CELL_ATTRIBUTES[name]) for name in layout.CELL_ATTRIBUTES
+    } | {
+        "criterion": ("criterion", np.arange(len(asked), dtype=np.int8), layout.criterion_attributes(asked)),
+        "verdict": ("verdict", np.arange(len(Verdict), dtype=np.int8), layout.VERDICT_ATTRIBUTES),
+    }
+    return xr.Dataset(variables, coordinates, dict(runs.attrs) | {"members": runs.sizes["member"]})
+
+
+def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the largest of the members, shape (cell,); not-a-number only where all are."""
+    numbers = np.where(np.isnan(measure), -np.inf, measure).max(axis=1)
+    return np.asarray(np.where(np.isneginf(numbers), np.nan, numbers))

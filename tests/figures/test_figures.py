@@ -7,8 +7,9 @@ import pytest
 from matplotlib.animation import FuncAnimation
 from PIL import Image
 
-from stiffdice import figures, frontier, sweep
-from stiffdice.figures import captions, style
+from stiffdice import figures, frontier
+from stiffdice.catalogue import DRAWINGS
+from stiffdice.figures import captions, cube, style
 from stiffdice.io.layout import run_dataset
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
@@ -20,26 +21,32 @@ def dataset(model, preset, **keys):
 
 
 @pytest.fixture(scope="module")
-def data(plan):
+def data(collected):
     presets = ("as_listed", "as_written")
     spin = {"angular_momentum": {"seed": 1}}
     throw = {preset: dataset("tumbling", preset, launch=spin, duration=2) for preset in presets}
     slide = {preset: dataset("sliding", preset, ground={"stiffness": 1e5}) for preset in presets}
-    collected = sweep.collect([sweep.compute(plan, cells) for cells in plan.shards().values()])
-    both = {"frontier": frontier.find(collected, {})}
-    return {"cube": throw, "anim": throw, "posi": slide, "ener": slide, "fron": both}
+    return {"cube": throw, "posi": slide, "ener": slide, "fron": {"steps-needed": frontier.find(collected)}}
 
 
-@pytest.mark.parametrize("drawing", [name for name in figures.DRAWINGS if name != "animation"])
+def drawn(drawing, given, title="A title"):
+    """The figure, not yet a file."""
+    with style.applied():
+        return DRAWINGS[drawing].load()(given, title)
+
+
+# Those of experiments and other sweeps are tested where they are defined.
+@pytest.mark.parametrize(
+    "drawing",
+    [name for name, entry in DRAWINGS.items() if entry.given == "runs" and name != "animation"] + ["frontier"],
+)
 def test_each_drawing_has_units_on_its_axes_and_gives_equal_files(data, tmp_path, drawing):
     given = data[drawing[:4]]
-    with style.applied():
-        figure = figures.DRAWINGS[drawing](given, "A title")
-        for axes in figure.axes:
-            outer = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
-            assert not outer or "[" in axes.get_xlabel(), axes
-            first = axes.get_subplotspec() is None or axes.get_subplotspec().is_first_col()
-            assert not first or "[" in axes.get_ylabel(), axes
+    for axes in drawn(drawing, given).axes:
+        outer = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
+        assert not outer or "[" in axes.get_xlabel(), axes
+        first = axes.get_subplotspec() is None or axes.get_subplotspec().is_first_col()
+        assert not first or "[" in axes.get_ylabel(), axes
     for name in "ab":
         figures.draw(drawing, given, "A title", 80, [str(tmp_path / f"{name}.{kind}") for kind in ("svg", "png")])
     for kind in ("svg", "png"):
@@ -64,7 +71,7 @@ def test_the_animation_runs_in_real_time(data, tmp_path):
 def test_the_animation_shows_the_cube_where_it_is(data):
     run = data["cube"]["as_listed"]
     with style.applied():
-        animation = figures.cube.animation(data["cube"], "The throw")
+        animation = cube.animation(data["cube"], "The throw")
         assert isinstance(animation, FuncAnimation)
         edges, trace, clock = animation._func(39)
     assert clock.get_text() == "t =  2.0 s"
@@ -78,8 +85,7 @@ def test_the_animation_shows_the_cube_where_it_is(data):
 def test_the_cube_is_drawn_turned_as_it_is(data):
     run = data["cube"]["as_listed"]
     for drawing, moment in (("cube-start", 0.0), ("cube-middle", 0.5), ("cube-end", 1.0)):
-        with style.applied():
-            axes = figures.DRAWINGS[drawing](data["cube"], "The throw").axes[0]
+        axes = drawn(drawing, data["cube"]).axes[0]
         index = round(moment * (run.sizes["time"] - 1))
         (cube,) = (part for part in axes.collections if len(getattr(part, "_segments3d", ())) == 12)
         corners = np.unique(np.asarray(cube._segments3d).reshape(-1, 3).round(9), axis=0)
@@ -90,8 +96,7 @@ def test_the_cube_is_drawn_turned_as_it_is(data):
 def test_a_tilted_ground_is_drawn_where_it_is(data):
     tilted = {"normal": [0.3, 0.1, 1.0]}
     run = {"as_listed": dataset("tumbling", "as_listed", ground=tilted, launch={"position": [0, 0, 4]}, duration=1)}
-    with style.applied():
-        axes = figures.DRAWINGS["cube-end"](run, "Slope").axes[0]
+    axes = drawn("cube-end", run).axes[0]
     (ground,) = (part for part in axes.collections if hasattr(part, "_faces"))
     np.testing.assert_allclose(np.asarray(ground._faces).reshape(-1, 3) @ tilted["normal"], 0, atol=1e-9)
 
@@ -101,8 +106,7 @@ def lines_of(axes):
 
 
 def test_position_is_drawn_for_both_readings(data):
-    with style.applied():
-        figure = figures.DRAWINGS["position"](data["cube"], "Position")
+    figure = drawn("position", data["cube"])
     for k, axes in enumerate(figure.axes):
         for preset, label in (("as_listed", "as listed"), ("as_written", "as written")):
             run = data["cube"][preset]
@@ -110,8 +114,7 @@ def test_position_is_drawn_for_both_readings(data):
 
 
 def test_energy_is_drawn_with_and_without_the_springs(data):
-    with style.applied():
-        figure = figures.DRAWINGS["energy"](data["ener"], "Energy")
+    figure = drawn("energy", data["ener"])
     for axes, run in zip(figure.axes, data["ener"].values(), strict=True):
         lines = lines_of(axes)
         np.testing.assert_array_equal(lines["paper's: kinetic + m g z"][:, 1], run.energy_paper)
@@ -119,28 +122,58 @@ def test_energy_is_drawn_with_and_without_the_springs(data):
         np.testing.assert_allclose(lines["energy at launch"][:, 1], 54.4, rtol=1e-14)
 
 
+CRITERIA = ["energy", "apex"]
+LAST_FAIL = 1
+
+
 def test_the_frontier_is_drawn_where_it_is(data):
-    found = data["fron"]["frontier"]
-    with style.applied():
-        figure = figures.DRAWINGS["frontier"](data["fron"], "Frontier")
+    found = data["fron"]["steps-needed"]
+    figure = drawn("frontier", data["fron"])
     upper, lower = figure.axes[1], figure.axes[3]  # the gated column
-    drawn = [np.asarray(line.get_xydata()) for line in upper.get_lines()]
+    lines = [np.asarray(line.get_xydata()) for line in upper.get_lines()]
     wanted = [found.limit.values]
-    for c in range(2):
-        fit = found.factor.values[1, c, 1] * found.stiffness.values ** found.exponent.values[1, c, 1]
-        wanted += [found.last_fail.values[1, c], found.first_pass.values[1, c], fit]
-    assert len(drawn) == len(wanted)
-    for line, values in zip(drawn, wanted, strict=True):
+    for c in range(len(CRITERIA)):
+        wanted += [found.last_fail.values[1, c], found.first_pass.values[1, c]]
+        factor, exponent = (found[name].values[1, c, LAST_FAIL] for name in ("factor", "exponent"))
+        wanted += [factor * found.stiffness.values**exponent]
+    assert len(lines) == len(wanted)
+    for line, values in zip(lines, wanted, strict=True):
         np.testing.assert_allclose(line, np.stack([found.stiffness, values], axis=1))
     full = [line for line in upper.get_lines() if line.get_markerfacecolor() != "none" and line.get_marker() != "None"]
-    assert len(full) == 2  # last fail is the full mark
+    assert len(full) == len(CRITERIA)  # last fail is the full mark
     below = [np.asarray(line.get_xydata())[:, 1] for line in lower.get_lines()]
     assert set(below[0]) == {2.0}
     np.testing.assert_allclose(below[1], np.sqrt(4 * found.stiffness) * 10 / found.last_fail.values[1, 0])
     dots = lower.collections[0]
     inside = found.cell_contact.values == 1
     np.testing.assert_allclose(dots.get_offsets()[:, 1], found.cell_omega_h.values[inside])
-    np.testing.assert_allclose(dots.get_array(), found.failing.values[:, inside].max(axis=0))
+    np.testing.assert_allclose(dots.get_array(), 1 - found.pass_fraction.values[:, inside].min(axis=0))
+
+
+def test_the_band_about_a_law_is_drawn(data):
+    found = data["fron"]["steps-needed"]
+    upper = drawn("frontier", data["fron"]).axes[1]
+    fits = {name: float(found[name].values[1, 1, LAST_FAIL]) for name in frontier.FIT}
+    low, high = frontier.band(fits, found.stiffness.values)
+    outlines = [path.vertices for part in upper.collections for path in part.get_paths()]
+    for edge in (low, high):
+        points = np.stack([found.stiffness.values, edge], axis=1)
+        assert any(all(np.isclose(outline, point).all(axis=1).any() for point in points) for outline in outlines)
+
+
+def test_each_sweep_has_its_columns_and_each_criterion_its_look(data):
+    one = data["fron"]["steps-needed"]
+    figure = drawn("frontier", {"a": one, "b": one.assign_attrs(model="tumbling").isel(contact=[1])})
+    titles = [axes.get_title(loc="left") for axes in figure.axes[:3]]
+    assert titles == [
+        "a cube that slides, as listed (ungated)",
+        "a cube that slides, as written (gated)",
+        "a cube that tumbles, as written (gated)",
+    ]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    for words in ("airborne energy ≤ 1.05 E₀", "apex ≤ 1.02 × the one before"):
+        assert f"first pass: {words}" in labels
+        assert f"last fail: {words}" in labels
 
 
 def test_the_note_under_a_figure_says_what_was_run():
@@ -160,8 +193,7 @@ def test_numbers_are_written_as_people_do(value, text):
 
 def test_an_energy_that_rises_is_seen(data):
     """The axis holds all of both energies: nothing is cropped."""
-    with style.applied():
-        figure = figures.DRAWINGS["energy"](data["posi"], "Energy")
+    figure = drawn("energy", data["posi"])
     for axes, run in zip(figure.axes, data["posi"].values(), strict=True):
         low, high = axes.get_ylim()
         full = run.energy_paper + run.elastic_energy

@@ -20,7 +20,8 @@ from PIL import Image
 
 from stiffdice import study as studies
 from stiffdice import sweep
-from stiffdice.io.read import open_file
+from stiffdice.io import FORMAT_VERSION
+from stiffdice.io.read import open_file, parts
 from stiffdice.scene import load
 from stiffdice.simulate import simulate
 
@@ -28,20 +29,30 @@ ROOT = Path(__file__).parent.parent.parent
 TINY = {
     "question": "Does all of it work?",
     "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10}},
-    "sweep": {
-        "scene": "config/scenes/figure-13.yaml",
-        "model": "sliding",
-        "contact": ["ungated", "gated"],
-        "stiffness": {"from": 1e3, "to": 1e5, "count": 3},
-        "omega_h": {"from": 3.0, "to": 0.3, "count": 12},
-        "members": 4,
-        "cells_per_shard": 30,
+    "sweeps": {
+        "steps": {
+            "scene": "config/scenes/figure-13.yaml",
+            "model": "sliding",
+            "contact": ["ungated", "gated"],
+            "stiffness": {"from": 1e3, "to": 1e5, "count": 3},
+            "omega_h": {"from": 3.0, "to": 0.3, "count": 12},
+            "members": 4,
+            "early_stop": False,
+            "columns_per_shard": 2,
+        },
+    },
+    "experiments": {
+        "books": {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}},
     },
     "figures": {
         "position": {"draw": "position", "run": "stiff", "title": "Position"},
-        "frontier": {"draw": "frontier", "title": "Frontier"},
+        "frontier": {"draw": "frontier", "of": ["steps"], "title": "Frontier"},
+        "books": {"draw": "ledger", "of": ["books"], "title": "Books"},
     },
+    "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
 }
+# What is due when all runs of the sweep are.
+AGAIN = {"shard": 3, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
 pytestmark = pytest.mark.workflow
 
 
@@ -110,7 +121,7 @@ def edited(finished):
 
     def edit(name: str, change) -> None:
         path = finished.folder / name
-        kept[path] = (path.read_bytes(), path.stat())
+        kept.setdefault(path, (path.read_bytes(), path.stat()))
         path.write_text(change(path.read_text()))
 
     yield edit
@@ -131,11 +142,11 @@ def test_all_files_are_there_and_open(finished):
             assert min(image.size) > 300
         assert "<svg" in (top / "figures" / f"{name}.svg").read_text()
     hdf5 = sorted(top.rglob("*.h5"))
-    assert len(hdf5) == 2 + 3 + 2  # runs, shards, sweep and frontier
+    assert len(hdf5) == 2 + 3 + 2 + 1  # runs, shards, sweep and frontier, experiment
     for path in hdf5:
         with xr.open_dataset(path) as found:
-            assert found.attrs["format_version"] == "1.0"
-    assert {path.stem for path in (top / "benchmarks").rglob("*.tsv")} >= {"collect", "frontier", "stiff.as_listed"}
+            assert found.attrs["format_version"] == FORMAT_VERSION
+    assert {path.stem for path in (top / "benchmarks").rglob("*.tsv")} >= {"steps", "answers", "stiff.as_listed"}
 
 
 @pytest.mark.parametrize("preset", ["as_listed", "as_written"])
@@ -148,26 +159,29 @@ def test_a_stored_run_is_what_the_simulator_says(finished, preset):
     assert float(found.energy_paper.max()) == pytest.approx(energy[preset], rel=1e-3)
 
 
-def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished):
-    plan = planned(finished).sweep
-    whole = sweep.collect([sweep.compute(plan, plan.cells())])
-    xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweep/sweep.h5"), whole)
+def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished, tmp_path):
+    plan = planned(finished).sweeps["steps"]
+    sweep.compute(plan, plan.columns(), tmp_path / "whole.h5")
+    whole = sweep.collect(parts(tmp_path / "whole.h5", 10), plan.criteria)
+    xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweeps/steps/sweep.h5"), whole)
 
 
 def test_the_table_says_what_the_file_says(finished):
-    found = open_file(finished.folder / "results/tiny/sweep/frontier.h5")
-    with (finished.folder / "results/tiny/sweep/frontier.csv").open() as file:
+    found = open_file(finished.folder / "results/tiny/sweeps/steps/frontier.h5")
+    with (finished.folder / "results/tiny/sweeps/steps/frontier.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 2 * 2 * 3
-    assert [float(row["first_pass"]) for row in rows] == found.first_pass.values.ravel().tolist()
-    assert [float(row["last_fail"]) for row in rows] == found.last_fail.values.ravel().tolist()
+    assert len(rows) == 2 * 2 * 3  # laws, criteria, stiffnesses
+    for edge in ("first_pass", "last_fail"):
+        told = [float(row[edge] or "nan") for row in rows]
+        np.testing.assert_array_equal(told, found[edge].values.ravel())
 
 
 def test_a_table_maps_the_shards_names_back(finished):
-    with (finished.folder / "results/tiny/sweep/shards.csv").open() as file:
+    with (finished.folder / "results/tiny/sweeps/steps/shards.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert {row["shard"] for row in rows} == set(planned(finished).sweep.shards())
-    assert sum(int(row["cells"]) for row in rows) == len(planned(finished).sweep.cells())
+    plan = planned(finished).sweeps["steps"]
+    assert {row["shard"] for row in rows} == set(plan.shards())
+    assert sum(int(row["cells"]) for row in rows) == sum(len(plan.scan(column)) for column in plan.columns())
 
 
 def test_a_rerun_with_nothing_changed_does_nothing(finished):
@@ -180,36 +194,43 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
 
 def test_a_changed_style_redraws_only(finished, edited):
     edited("src/stiffdice/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
-    assert finished.jobs_due() == {"figure": 2}
+    assert finished.jobs_due() == {"figure": 3}
 
 
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     edited("src/stiffdice/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
-    assert finished.jobs_due() == {"shard": 3, "trajectory": 2, "collect": 1, "frontier": 1, "figure": 2}
+    everything = {"shard": 3, "trajectory": 2, "experiment": 1, "collect": 1, "frontier": 1, "figure": 3, "table": 1}
+    assert finished.jobs_due() == everything
 
 
 def test_a_changed_analysis_computes_no_run_again(finished, edited):
     edited("src/stiffdice/frontier.py", lambda text: text + "\n")
-    assert finished.jobs_due() == {"frontier": 1, "figure": 1}
+    assert finished.jobs_due() == {"frontier": 1, "figure": 1, "table": 1}
 
 
 def test_a_changed_scene_is_run_again(finished, edited):
     edited("config/scenes/figure-09.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
-    assert finished.jobs_due() == {"trajectory": 2, "figure": 1}
+    assert finished.jobs_due() == {"trajectory": 2, "experiment": 1, "figure": 2}
 
 
 def test_a_changed_scene_of_the_sweep_is_swept_again(finished, edited):
     edited("config/scenes/figure-13.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
-    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+    assert finished.jobs_due() == AGAIN
 
 
 def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
     edited("src/stiffdice/ensemble.py", lambda text: text + "\n")
-    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+    assert finished.jobs_due() == AGAIN
 
 
 @pytest.mark.parametrize(
-    ("script", "due"), [("figure", {"figure": 2}), ("collect", {"collect": 1, "frontier": 1, "figure": 1})]
+    ("script", "due"),
+    [
+        ("figure", {"figure": 3}),
+        ("table", {"table": 1}),
+        ("experiment", {"experiment": 1, "figure": 1}),
+        ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
+    ],
 )
 def test_a_changed_script_does_its_part_again(finished, edited, script, due):
     edited(f"workflow/scripts/{script}.py", lambda text: text + "\n")
@@ -223,8 +244,21 @@ def test_a_touched_file_is_no_change(finished):
 
 
 def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
+    """Unless runs were stopped by the old one."""
     edited("config/tiny.yaml", lambda text: text + "criteria: {apex: 0.5}\n")
-    assert finished.jobs_due() == {"frontier": 1, "figure": 1}
+    assert finished.jobs_due() == {"collect": 1, "frontier": 1, "figure": 1, "table": 1}
+    edited("config/tiny.yaml", lambda text: text.replace("early_stop: false", "early_stop: true"))
+    assert finished.jobs_due() == AGAIN
+
+
+def test_a_changed_drawing_draws_its_figure_only(finished, edited):
+    edited("src/stiffdice/figures/ledger.py", lambda text: text + "\n")
+    assert finished.jobs_due() == {"figure": 1}
+
+
+def test_changed_options_make_an_experiment_again(finished, edited):
+    edited("config/tiny.yaml", lambda text: text.replace("- 20000", "- 30000"))
+    assert finished.jobs_due() == {"experiment": 1, "figure": 1}
 
 
 def test_a_changed_title_redraws_its_figure(finished, edited):
@@ -234,7 +268,7 @@ def test_a_changed_title_redraws_its_figure(finished, edited):
 
 def test_another_grid_is_computed(finished, edited):
     edited("config/tiny.yaml", lambda text: text.replace("members: 4", "members: 5"))
-    assert finished.jobs_due() == {"shard": 3, "collect": 1, "frontier": 1, "figure": 1}
+    assert finished.jobs_due() == AGAIN
 
 
 def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
@@ -242,7 +276,9 @@ def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
     done = finished.snakemake()
     assert done.returncode == 2
     lines = [line for line in done.stderr.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines == ["stiffdice: config/tiny.yaml: sweep.members = none: allowed is a whole number from 1 to 1000000"]
+    assert lines == [
+        "stiffdice: config/tiny.yaml: sweeps.steps.members = none: allowed is a whole number from 1 to 1000000"
+    ]
 
 
 @pytest.mark.parametrize("name", ["../x", "a b", "v1.5", "nowhere", ""])
@@ -261,7 +297,7 @@ def test_another_study_does_not_mind_a_broken_paper(finished, edited):
 
 
 def test_a_damaged_shard_is_named_with_its_remedy(finished, tmp_path):
-    (shard, *_) = sorted((finished.folder / "results/tiny/sweep/shards").glob("*.h5"))
+    (shard, *_) = sorted((finished.folder / "results/tiny/sweeps/steps/shards").glob("*.h5"))
     content, stat = shard.read_bytes(), shard.stat()
     try:
         shard.write_bytes(content[:1000])
@@ -295,10 +331,10 @@ def test_lint_finds_nothing(finished):
 
 def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other = Project(tmp_path)
-    other.plan({**TINY, "sweep": {**TINY["sweep"], "cells_per_shard": 11}})
+    other.plan({**TINY, "sweeps": {"steps": {**TINY["sweeps"]["steps"], "columns_per_shard": 1}}})
     done = other.snakemake("--cores", "1")
     assert done.returncode == 0, done.stderr
-    data = ("sweep/sweep.h5", "sweep/frontier.*", "runs/*.h5", "figures/*")
+    data = ("sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "runs/*.h5", "figures/*")
     assert other.results(*data) == finished.results(*data)
 
 
@@ -314,7 +350,7 @@ def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
         start_new_session=True,
     )
     deadline = time.monotonic() + 120
-    while not project.results("sweep/shards/*.h5"):
+    while not project.results("sweeps/steps/shards/*.h5"):
         assert time.monotonic() < deadline
         time.sleep(0.01)
     os.killpg(running.pid, signal.SIGKILL)
@@ -322,7 +358,7 @@ def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
     assert project.jobs_due()
     done = project.snakemake()
     assert done.returncode == 0, done.stderr
-    data = ("**/*.h5", "sweep/*.csv", "figures/*")
+    data = ("**/*.h5", "sweeps/steps/*.csv", "figures/*")
     assert project.results(*data) == finished.results(*data)
 
 

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from stiffdice import study as studies
+from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES
 from stiffdice.errors import InputError
 from stiffdice.provenance import code_digest
 
@@ -18,6 +19,9 @@ wildcard_constraints:
     figure="[a-z0-9][a-z0-9-]*",
     preset="as_listed|as_written|corrected",
     shard="[0-9a-f]{12}",
+    sweep="[a-z0-9][a-z0-9-]*",
+    experiment="[a-z0-9][a-z0-9-]*",
+    table="[a-z0-9][a-z0-9-]*",
 
 
 def code_of(script, *modules):
@@ -42,17 +46,30 @@ def study(name):
         sys.exit(2)
 
 
-@cache
-def shards_of(name):
-    return study(name).sweep.shards() if study(name).sweep else {}
-
-
 def planned_run(wildcards):
     return study(wildcards.study).runs[wildcards.run]
 
 
+def planned_sweep(wildcards):
+    return study(wildcards.study).sweeps[wildcards.sweep]
+
+
+def planned_experiment(wildcards):
+    return study(wildcards.study).experiments[wildcards.experiment]
+
+
 def planned_figure(wildcards):
     return study(wildcards.study).figures[wildcards.figure]
+
+
+def planned_table(wildcards):
+    return study(wildcards.study).tables[wildcards.table]
+
+
+@cache
+def shards_of(name, sweep):
+    """Return the columns of each shard of a sweep, by the shard's id."""
+    return study(name).sweeps[sweep].shards()
 
 
 def figure_files(name, figure):
@@ -61,14 +78,34 @@ def figure_files(name, figure):
     return [f"results/{name}/figures/{figure}.{kind}" for kind in kinds]
 
 
-def data_of(wildcards):
-    """Return the files a figure is drawn from: a run as listed and as written, or the frontier of a sweep."""
+def found_by(name, planned, kind):
+    """Return the files of the sweeps or experiments that a figure or a table shows, by their names."""
+    places = {"sweeps": "sweeps/{}/frontier.h5", "experiments": "experiments/{}.h5"}
+    return {source: f"results/{name}/{places[kind].format(source)}" for source in planned.of}
+
+
+def data_of_figure(wildcards):
+    """Return the files a figure is drawn from: a run in each preset, or what sweeps or experiments found."""
     planned = planned_figure(wildcards)
-    folder = f"results/{wildcards.study}"
     if planned.run is None:
-        return {"frontier": f"{folder}/sweep/frontier.h5"}
+        return found_by(wildcards.study, planned, DRAWINGS[planned.draw].given)
     presets = study(wildcards.study).runs[planned.run].presets
-    return {preset: f"{folder}/runs/{planned.run}.{preset}.h5" for preset in presets}
+    return {preset: f"results/{wildcards.study}/runs/{planned.run}.{preset}.h5" for preset in presets}
+
+
+def data_of_table(wildcards):
+    planned = planned_table(wildcards)
+    return found_by(wildcards.study, planned, TABLES[planned.draw].given)
+
+
+def drawing_code(planned):
+    """Return the digest of what a figure depends on: the one module that draws it, and what that imports."""
+    return code_of("figure.py", DRAWINGS[planned.draw].module, "stiffdice.figures", "stiffdice.io.read")
+
+
+def telling_code(planned):
+    """Return the digest of what a table depends on."""
+    return code_of("table.py", TABLES[planned.draw].module, "stiffdice.io.read", "stiffdice.io.write")
 
 
 def everything_of(name):
@@ -76,8 +113,10 @@ def everything_of(name):
     planned = study(name)
     files = [file for figure in planned.figures for file in figure_files(name, figure)]
     files += [f"results/{name}/runs/{run}.{preset}.h5" for run in planned.runs for preset in planned.runs[run].presets]
-    if planned.sweep:
-        files += expand("results/{study}/sweep/{file}", study=name, file=["sweep.h5", "frontier.h5", "frontier.csv"])
+    for sweep in planned.sweeps:
+        files += [f"results/{name}/sweeps/{sweep}/{file}" for file in ("sweep.h5", "frontier.h5", "frontier.csv")]
+    files += [f"results/{name}/experiments/{experiment}.h5" for experiment in planned.experiments]
+    files += [f"results/{name}/tables/{table}.{kind}" for table in planned.tables for kind in ("md", "csv")]
     return files
 
 

@@ -1,9 +1,9 @@
-# Datasets in, figures out.
+# Datasets in, figures and tables out.
 
 
 rule figure:
     input:
-        unpack(data_of),
+        unpack(data_of_figure),
     output:
         report(
             "results/{study}/figures/{figure}.svg",
@@ -15,7 +15,7 @@ rule figure:
     params:
         figure=lambda wildcards: planned_figure(wildcards),
         dpi=lambda wildcards: study(wildcards.study).dpi,
-        code=code_of("figure.py", "stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+        code=lambda wildcards: drawing_code(planned_figure(wildcards)),
     log:
         "results/{study}/logs/figure/{figure}.log",
     benchmark:
@@ -40,8 +40,35 @@ use rule figure as animation with:
     params:
         figure=lambda wildcards: planned_figure(wildcards),
         dpi=80,  # for screens, whatever the study asks of its PNG files
-        code=code_of("figure.py", "stiffdice.figures", "stiffdice.io.read", "stiffdice.io.write"),
+        code=lambda wildcards: drawing_code(planned_figure(wildcards)),
     log:
         "results/{study}/logs/animation/{figure}.log",
     benchmark:
         "results/{study}/benchmarks/animation/{figure}.tsv"
+
+
+rule table:
+    input:
+        unpack(data_of_table),
+    output:
+        markdown=report(
+            "results/{study}/tables/{table}.md",
+            caption="../report/table.rst",
+            category="{study}",
+            labels={"what": "{table}"},
+        ),
+        csv="results/{study}/tables/{table}.csv",
+    params:
+        table=lambda wildcards: planned_table(wildcards),
+        code=lambda wildcards: telling_code(planned_table(wildcards)),
+    log:
+        "results/{study}/logs/table/{table}.log",
+    benchmark:
+        "results/{study}/benchmarks/table/{table}.tsv"
+    resources:
+        mem_mb=700,
+        runtime=5,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/table.py"

@@ -8,7 +8,7 @@ rule trajectory:
         "results/{study}/runs/{run}.{preset}.h5",
     params:
         run=lambda wildcards: planned_run(wildcards),
-        code=code_of("trajectory.py", "stiffdice.io.layout", "stiffdice.io.write"),
+        code=code_of("trajectory.py", "stiffdice.io.layout", "stiffdice.ledger", "stiffdice.io.write"),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",
     benchmark:

@@ -1,19 +1,19 @@
-# A grid of stiffness and steps: shards of many cells, collected, and searched for the edges of stability.
+# A grid of stiffness and steps: shards of many runs, collected and judged, and searched for the edges of stability.
 
 
-# A shard's name is a digest of its scene and cells, so it needs no input file: another scene is another shard.
+# A shard's name is a digest of its scene and columns, so it needs no input file: another scene is another shard.
 rule shard:
     output:
-        "results/{study}/sweep/shards/{shard}.h5",
+        "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
         # Snakemake compares plain data only; that `sweep` changed it learns from the shard's name.
-        sweep=lambda wildcards: study(wildcards.study).sweep,
-        cells=lambda wildcards: shards_of(wildcards.study)[wildcards.shard],
-        code=code_of("shard.py", "stiffdice.sweep", "stiffdice.io.write"),
+        sweep=lambda wildcards: planned_sweep(wildcards),
+        columns=lambda wildcards: shards_of(wildcards.study, wildcards.sweep)[wildcards.shard],
+        code=code_of("shard.py", "stiffdice.sweep"),
     log:
-        "results/{study}/logs/shard/{shard}.log",
+        "results/{study}/logs/shard/{sweep}/{shard}.log",
     benchmark:
-        "results/{study}/benchmarks/shard/{shard}.tsv"
+        "results/{study}/benchmarks/shard/{sweep}/{shard}.tsv"
     priority: 10
     resources:
         mem_mb=700,
@@ -26,16 +26,19 @@ rule shard:
 
 rule collect:
     input:
-        lambda wildcards: expand("results/{{study}}/sweep/shards/{shard}.h5", shard=shards_of(wildcards.study)),
+        lambda wildcards: expand(
+            "results/{{study}}/sweeps/{{sweep}}/shards/{shard}.h5", shard=shards_of(wildcards.study, wildcards.sweep)
+        ),
     output:
-        sweep="results/{study}/sweep/sweep.h5",
-        table="results/{study}/sweep/shards.csv",
+        sweep="results/{study}/sweeps/{sweep}/sweep.h5",
+        table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
+        tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
         code=code_of("collect.py", "stiffdice.sweep", "stiffdice.io.read", "stiffdice.io.write"),
     log:
-        "results/{study}/logs/collect.log",
+        "results/{study}/logs/collect/{sweep}.log",
     benchmark:
-        "results/{study}/benchmarks/collect.tsv"
+        "results/{study}/benchmarks/collect/{sweep}.tsv"
     priority: 10
     resources:
         mem_mb=1000,
@@ -48,22 +51,21 @@ rule collect:
 
 rule frontier:
     input:
-        "results/{study}/sweep/sweep.h5",
+        "results/{study}/sweeps/{sweep}/sweep.h5",
     output:
-        data="results/{study}/sweep/frontier.h5",
+        data="results/{study}/sweeps/{sweep}/frontier.h5",
         table=report(
-            "results/{study}/sweep/frontier.csv",
-            caption="../report/table.rst",
+            "results/{study}/sweeps/{sweep}/frontier.csv",
+            caption="../report/frontier.rst",
             category="{study}",
-            labels={"what": "the numbers behind the frontier"},
+            labels={"what": "{sweep}: the numbers behind the frontier"},
         ),
     params:
-        tolerances=lambda wildcards: dict(study(wildcards.study).tolerances),
         code=code_of("frontier.py", "stiffdice.frontier", "stiffdice.io.read", "stiffdice.io.write"),
     log:
-        "results/{study}/logs/frontier.log",
+        "results/{study}/logs/frontier/{sweep}.log",
     benchmark:
-        "results/{study}/benchmarks/frontier.tsv"
+        "results/{study}/benchmarks/frontier/{sweep}.tsv"
     priority: 10
     resources:
         mem_mb=1000,

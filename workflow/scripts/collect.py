@@ -1,28 +1,43 @@
-"""Collect shards into one sweep, with a table that says what is in which."""
+"""Collect shards into one sweep of judged cells, with a table that says what is in which."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
 from job import logged
 
 from stiffdice import sweep
 from stiffdice.errors import InputError
-from stiffdice.io.read import open_file
+from stiffdice.io.read import parts
 from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
+lines = ["shard,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
+
+
+def shards() -> Iterator[xr.Dataset]:
+    """Read one shard after another, part by part, and note what is in it."""
+    for path in snakemake.input:
+        stiffness, steps, members = [], [], 0
+        try:
+            for part in parts(path, sweep.AT_ONCE):
+                stiffness.append(part.stiffness.values)
+                steps.append(part.steps.values)
+                members = part.sizes["member"]
+                yield part
+        except InputError as error:
+            raise InputError(f"{error}; remove the file, and the same command computes it again") from None
+        softest_to_hardest, fewest_to_most = np.sort(np.concatenate(stiffness)), np.sort(np.concatenate(steps))
+        lines.append(
+            f"{Path(path).stem},{len(fewest_to_most)},{members},{softest_to_hardest[0]:g},{softest_to_hardest[-1]:g},"
+            f"{fewest_to_most[0]},{fewest_to_most[-1]}"
+        )
+
+
 with logged(snakemake.log[0]) as say:
-    try:
-        shards = [open_file(path) for path in snakemake.input]
-    except InputError as error:
-        raise InputError(f"{error}; remove the file, and the same command computes it again") from None
-    lines = ["shard,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
-    for path, shard in zip(snakemake.input, shards, strict=True):
-        sizes = f"{shard.sizes['cell']},{shard.sizes['member']}"
-        stiffness, steps = shard.stiffness.values, shard.steps.values
-        ranges = f"{stiffness.min():g},{stiffness.max():g},{steps.min()},{steps.max()}"
-        lines.append(f"{Path(path).stem},{sizes},{ranges}")
-    write_dataset(sweep.collect(shards), snakemake.output.sweep)
+    write_dataset(sweep.collect(shards(), snakemake.params.tolerances), snakemake.output.sweep)
     write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)
-    say(f"{len(shards)} shards collected")
+    say(f"{len(lines) - 1} shards collected")

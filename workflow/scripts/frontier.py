@@ -11,7 +11,7 @@ from stiffdice.io.write import write_bytes, write_dataset
 snakemake: Any  # Snakemake puts it here
 
 with logged(snakemake.log[0]) as say:
-    found = frontier.find(open_file(snakemake.input[0]), snakemake.params.tolerances)
+    found = frontier.find(open_file(snakemake.input[0]))
     write_dataset(found, snakemake.output.data)
     write_bytes(frontier.table(found).encode(), snakemake.output.table)
     say(f"{found.sizes['stiffness']} stiffnesses, {found.sizes['criterion']} criteria")

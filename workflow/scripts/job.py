@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -28,8 +29,8 @@ def logged(path: str) -> Iterator[Callable[[str], None]]:
             sys.exit(130)
         except StiffdiceError as error:
             say(f"failed: {error}")
-            print(f"stiffdice: {error}", file=sys.stderr)
-            sys.exit(2)
+            print(f"stiffdice: {error}", file=sys.stderr, flush=True)
+            os._exit(2)  # HDF5 crashes on the way out after a file could not be written, and the status is lost
 
 
 def tenths(say: Callable[[str], None]) -> Callable[[float], None]:

@@ -1,17 +1,15 @@
-"""Compute the cells of one shard and store them."""
+"""Compute the columns of one shard and store their runs."""
 
 from typing import Any
 
 from job import Stopwatch, logged, tenths
 
 from stiffdice import sweep
-from stiffdice.io.write import write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
 with logged(snakemake.log[0]) as say:
     watch = Stopwatch()
     with watch.running():
-        shard = sweep.compute(snakemake.params.sweep, snakemake.params.cells, tenths(say))
-    write_dataset(shard, snakemake.output[0])
+        sweep.compute(snakemake.params.sweep, snakemake.params.columns, snakemake.output[0], tenths(say))
     say(f"simulation: {watch.seconds:.3f} s")

@@ -1,9 +1,10 @@
-"""Run one scene and store its trajectory."""
+"""Run one scene and store its trajectory, with the ledger of its energy."""
 
 from typing import Any
 
 from job import Stopwatch, logged
 
+from stiffdice import ledger
 from stiffdice import scene as scenes
 from stiffdice.io.layout import run_dataset
 from stiffdice.io.write import write_dataset
@@ -17,5 +18,7 @@ with logged(snakemake.log[0]) as say:
     watch = Stopwatch()
     with watch.running():
         run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps, every=planned.every)
-    write_dataset(run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}"), snakemake.output[0])
+        books = ledger.keep(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps)
+    dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
+    write_dataset(dataset.assign(ledger.variables(books)), snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

@@ -1,38 +1,30 @@
-"""Datasets in, figures out. A drawing is a function; one line registers it."""
+"""Datasets in, figures out. A drawing is a function; one line of `catalogue.py` registers it."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
-from stiffdice.figures import cube, frontier, style, trajectory
+from stiffdice.catalogue import DRAWINGS
+from stiffdice.figures import style
 from stiffdice.io.write import write_bytes
 
-# What a study may ask for under `figures`, and the function that draws it. Each takes the datasets and the title.
-DRAWINGS: dict[str, Any] = {
-    "cube-start": lambda data, title: cube.at(data, title, 0.0),
-    "cube-middle": lambda data, title: cube.at(data, title, 0.5),
-    "cube-end": lambda data, title: cube.at(data, title, 1.0),
-    "animation": cube.animation,
-    "position": trajectory.position,
-    "energy": trajectory.energy,
-    "frontier": lambda data, title: frontier.steps_needed(data["frontier"], title),
-}
+# Of an animation; 50 ms a frame, because a GIF counts in hundredths of a second.
+FRAMES_PER_SECOND = 20
 
 
 def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, paths: list[str]) -> None:
     """Draw one figure into files, whose endings say the format; equal data give equal files.
 
-    data: runs by preset, or `frontier`. Raises OutputError if a file cannot be stored.
+    data: runs by preset, or what sweeps and experiments found, by name. Raises OutputError if a file cannot be stored.
     """
     with style.applied():
-        figure = DRAWINGS[drawing](data, title)
+        figure = DRAWINGS[drawing].load()(data, title)
         for path in paths:
             write_bytes(_encoded(figure, Path(path).suffix[1:], dpi), path)
 
@@ -51,5 +43,5 @@ def _gif(animation: FuncAnimation, dpi: int) -> bytes:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
-        animation.save(path, writer=PillowWriter(fps=cube.FRAMES_PER_SECOND), dpi=dpi)
+        animation.save(path, writer=PillowWriter(fps=FRAMES_PER_SECOND), dpi=dpi)
         return path.read_bytes()

@@ -14,13 +14,26 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from stiffdice.cube import LINKS
-from stiffdice.figures import style
+from stiffdice.figures import FRAMES_PER_SECOND, style
 from stiffdice.figures.captions import describe
 
-FRAMES_PER_SECOND = 20  # 50 ms a frame: a GIF counts in hundredths of a second
+
+def start(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the cube at the launch."""
+    return _at(runs, title, 0.0)
 
 
-def at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
+def middle(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the cube half-way through the run."""
+    return _at(runs, title, 0.5)
+
+
+def end(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the cube at the end of the run."""
+    return _at(runs, title, 1.0)
+
+
+def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
     """Return the cube at a moment: 0 is the start of the run, 1 its end."""
     run = next(iter(runs.values()))
     index = round(moment * (run.sizes["time"] - 1))

@@ -1,4 +1,4 @@
-"""Figure 13: the steps that a stiffness needs, by two criteria and two contact laws, with the scan that says so."""
+"""Figure 13: the steps that a stiffness needs, by criterion and contact law, with the scan that says so."""
 
 from __future__ import annotations
 
@@ -15,36 +15,29 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice import theory
 from stiffdice.figures import style
+from stiffdice.frontier import EDGES, FIT, band
 from stiffdice.io.enums import meanings_of
 
-# One look for each criterion, in their order.
-_LOOKS = (
-    {"color": style.BLUE, "first": "v", "last": "^"},
-    {"color": style.VERMILION, "first": "s", "last": "D"},
-    {"color": style.GREEN, "first": "o", "last": "p"},
-)
-_SAY = {
-    "energy": "airborne energy ≤ {limit:g} E₀",
-    "apex": "apex ≤ {limit:g} × the one before",
-}
-_LAWS = {"ungated": "as listed (ungated)", "gated": "as written (gated)"}
+_MODELS = {"sliding": "a cube that slides", "tumbling": "a cube that tumbles"}
 
 
-def steps_needed(frontier: xr.Dataset, title: str) -> Figure:
-    """Return steps against stiffness above, and the same edges as ωh below, a column for each contact law."""
-    laws = [meanings_of(frontier.contact)[k] for k in frontier.contact.values]
-    figure = style.new_figure(title, width=4.2 * len(laws) + 0.6, height=7.0)
-    panels = figure.subplots(2, len(laws), sharex=True, sharey="row", squeeze=False)
-    for column, law in enumerate(laws):
-        upper, lower = panels[:, column]
-        upper.set_title(_LAWS[law])
-        _steps(upper, frontier.isel(contact=column))
-        _omega_h(lower, frontier.isel(contact=column))
+def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return steps against stiffness above, and the same edges as ωh below, a column for each sweep and contact law."""
+    columns = [found.isel(contact=k) for found in sweeps.values() for k in range(found.sizes["contact"])]
+    figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=7.4)
+    panels = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
+    for (upper, lower), frontier in zip(panels.T, columns, strict=True):
+        law = style.LAW_NAMES[meanings_of(frontier.contact)[int(frontier.contact)]]
+        upper.set_title(law if len(sweeps) == 1 else f"{_MODELS[frontier.attrs['model']]}, {law}")
+        _steps(upper, frontier)
+        _omega_h(lower, frontier)
         lower.set_xlabel("stiffness S [kg/s²]")
-    duration = json.loads(frontier.attrs["scene"])["duration"]
+    notes = max(len(panel.texts) for panel in panels[0])
+    panels[0, 0].set_ylim(top=panels[0, 0].get_ylim()[1] * 10 ** (0.12 * notes))  # room for them above the lines
+    duration = json.loads(columns[0].attrs["scene"])["duration"]
     panels[0, 0].set_ylabel(f"time steps in {duration:g} s [1]")
     panels[1, 0].set_ylabel("ωh of a flat landing [1]")
-    figure.legend(handles=_legend(frontier), loc="outside lower center", ncols=3 if len(laws) > 1 else 1)
+    figure.legend(handles=_legend(columns), loc="outside lower center", ncols=3 if len(columns) > 1 else 1)
     return figure
 
 
@@ -53,21 +46,30 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
     panel.set(xscale="log", yscale="log")
     panel.plot(stiffness, frontier.limit, color=style.INK, linestyle="--", linewidth=1.0, zorder=4)
     notes = []
-    fitted = meanings_of(frontier.edge).index("last_fail")
-    for c, criterion in enumerate(meanings_of(frontier.criterion)):
-        look = _LOOKS[c % len(_LOOKS)]
-        first, last = frontier.first_pass.values[c], frontier.last_fail.values[c]
-        panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.15, linewidth=0)
+    for criterion, found in _by_criterion(frontier):
+        look = style.CRITERION_LOOKS[criterion]
+        first, last = found.first_pass.values, found.last_fail.values
+        panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.10, linewidth=0)
         _marks(panel, stiffness, first, last, look)
-        exponent, error, factor = (
-            float(frontier[name].values[c, fitted]) for name in ("exponent", "exponent_error", "factor")
-        )
-        if np.isfinite(exponent):
-            panel.plot(stiffness, factor * stiffness**exponent, color=look["color"], linewidth=0.8)
-            power = rf"$S^{{\,{exponent:.3f}\pm{error:.3f}}}$"
+        fit = {name: float(found[name].isel(edge=list(EDGES).index("last_fail"))) for name in FIT}
+        if np.isfinite(fit["exponent"]):
+            low, high = band(fit, stiffness)
+            panel.fill_between(stiffness, low, high, color=look["color"], alpha=0.25, linewidth=0)
+            panel.plot(stiffness, fit["factor"] * stiffness ** fit["exponent"], color=look["color"], linewidth=0.8)
+            digits = 3 if fit["exponent_error"] >= 5e-4 else 4
+            power = rf"$S^{{\,{fit['exponent']:.{digits}f}\pm{fit['exponent_error']:.{digits}f}}}$"
             notes.append((f"{criterion}: last fail ∝ {power}", look["color"]))
+    never_broken = set(meanings_of(frontier.criterion)) - {name for name, _ in _by_criterion(frontier)}
+    notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in sorted(never_broken)]
     for k, (note, color) in enumerate(notes):
-        panel.text(0.03, 0.95 - 0.065 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
+        panel.text(0.03, 0.97 - 0.06 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
+
+
+def _by_criterion(frontier: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Return the criteria that some member breaks, each with what was found of it."""
+    names = meanings_of(frontier.criterion)
+    broken = frontier.pass_fraction.values.min(axis=1) < 1
+    return [(name, frontier.isel(criterion=c)) for c, name in enumerate(names) if broken[c]]
 
 
 def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str, str]) -> None:
@@ -83,7 +85,7 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
     panel.scatter(
         scan.cell_stiffness,
         scan.cell_omega_h,
-        c=scan.failing.values.max(axis=0),
+        c=1 - scan.pass_fraction.values.min(axis=0),
         s=2.5,
         cmap="Greys",
         vmin=-0.15,
@@ -92,32 +94,23 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
     )
     panel.axhline(theory.STABILITY_LIMIT, color=style.INK, linestyle="--", linewidth=1.0)
     scale = frontier.limit.values * theory.STABILITY_LIMIT
-    for c in range(frontier.sizes["criterion"]):
-        first, last = (scale / frontier[edge].values[c] for edge in ("first_pass", "last_fail"))
-        _marks(panel, frontier.stiffness, first, last, _LOOKS[c % len(_LOOKS)])
+    for criterion, found in _by_criterion(frontier):
+        first, last = (scale / found[edge].values for edge in ("first_pass", "last_fail"))
+        _marks(panel, frontier.stiffness, first, last, style.CRITERION_LOOKS[criterion])
     panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     panel.yaxis.set_major_formatter("{x:g}")
     panel.yaxis.set_minor_locator(NullLocator())
 
 
-def _legend(frontier: xr.Dataset) -> list[Any]:
+def _legend(columns: list[xr.Dataset]) -> list[Any]:
     handles: list[Any] = []
-    for c, criterion in enumerate(meanings_of(frontier.criterion)):
-        look, limit = _LOOKS[c % len(_LOOKS)], 1 + float(frontier.tolerance[c])
-        words = _SAY.get(criterion, criterion).format(limit=limit)
+    tolerances = {name: float(found.tolerance) for frontier in columns for name, found in _by_criterion(frontier)}
+    for criterion, tolerance in tolerances.items():
+        look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance)
         common: Any = {"linestyle": "none", "color": look["color"]}
-        handles.append(
-            Line2D(
-                [],
-                [],
-                marker=look["first"],
-                markersize=5.5,
-                markerfacecolor="none",
-                label=f"first pass: {words}",
-                **common,
-            )
-        )
+        open_mark: Any = {"marker": look["first"], "markersize": 5.5, "markerfacecolor": "none"}
+        handles.append(Line2D([], [], label=f"first pass: {words}", **open_mark, **common))
         handles.append(Line2D([], [], marker=look["last"], markersize=4, label=f"last fail: {words}", **common))
     handles.append(Line2D([], [], color=style.INK, linestyle="--", label="theory: ωh = 2"))
-    handles.append(Patch(color=style.QUIET, label="scanned cell, darker: more members fail"))
+    handles.append(Patch(color=style.QUIET, label="scanned cell, darker: more members fail any of these"))
     return handles

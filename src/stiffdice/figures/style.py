@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 
 # Okabe and Ito, "Color Universal Design" (2008), ordered by lightness in grey.
@@ -19,6 +21,31 @@ PRESET_LOOKS: dict[str, dict[str, Any]] = {
     "as_written": {"color": WRITTEN, "label": "as written", "zorder": 2, "linewidth": 2.0},
     "corrected": {"color": GREEN, "label": "corrected", "zorder": 2.5},
 }
+
+LAW_NAMES = {"ungated": "as listed (ungated)", "gated": "as written (gated)"}
+
+# Of a criterion's edges: colour, and the marks of first pass and last fail.
+PURPLE = "#AA4499"  # Tol, "Colour schemes" (2021): the fifth that the four above leave room for
+CRITERION_LOOKS: dict[str, dict[str, str]] = {
+    "finite": {"color": QUIET, "first": "P", "last": "X"},
+    "energy": {"color": BLUE, "first": "v", "last": "^"},
+    "apex": {"color": VERMILION, "first": "s", "last": "D"},
+    "restitution": {"color": GREEN, "first": "o", "last": "p"},
+    "trajectory": {"color": PURPLE, "first": "<", "last": ">"},
+}
+_CRITERION_WORDS = {
+    "finite": "numbers stay finite",
+    "energy": "airborne energy ≤ {0:g} E₀",
+    "apex": "apex ≤ {0:g} × the one before",
+    "restitution": "e within {1:g} of exact",
+    "trajectory": "within {1:g} r of the reference",
+}
+
+
+def criterion_words(criterion: str, tolerance: float) -> str:
+    """Return what a criterion asks, in a few words."""
+    return _CRITERION_WORDS[criterion].format(1 + tolerance, tolerance)
+
 
 _SETTINGS: Any = {
     "figure.constrained_layout.use": True,
@@ -64,3 +91,24 @@ def new_figure(title: str, width: float = 7.2, height: float = 4.4) -> Figure:
 def add_note(figure: Figure, text: str) -> None:
     """Write one quiet line under a figure: what was run."""
     figure.supxlabel(text, x=0.01, ha="left", fontsize=7.5, color=QUIET)
+
+
+def borders(centres: npt.NDArray[np.float64], *, logarithmic: bool = False) -> npt.NDArray[np.float64]:
+    """Return the borders of cells that reach half-way to their neighbours, sorted as `centres`, shape (cell + 1,).
+
+    A cell alone reaches half a unit to either side, half an e-fold if logarithmic.
+    """
+    places = np.log(centres) if logarithmic else centres
+    between = (places[1:] + places[:-1]) / 2
+    below, above = (between[0] - places[0], places[-1] - between[-1]) if len(between) else (0.5, 0.5)
+    whole = np.concatenate([[places[0] - below], between, [places[-1] + above]])
+    return np.asarray(np.exp(whole) if logarithmic else whole)
+
+
+def top_axis(panel: Any, ticks: Sequence[float], labels: Sequence[str]) -> Any:
+    """Return a second axis on top of a panel, with labelled ticks at places of the first."""
+    top = panel.secondary_xaxis("top")
+    top.set_xticks(ticks, labels)
+    top.minorticks_off()
+    top.tick_params(labelsize=7.5)
+    return top

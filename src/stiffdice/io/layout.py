@@ -3,34 +3,72 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from stiffdice import __version__, theory
 from stiffdice.contact import LAWS
+from stiffdice.criteria import CRITERIA
 from stiffdice.cube import SIGNS
 from stiffdice.io import FORMAT_VERSION
 from stiffdice.io.enums import enum_attributes
-from stiffdice.measures import MEASURES
 from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, Trajectory
 from stiffdice.state import TURNING
-from stiffdice.verdict import Verdict, criteria_of
+from stiffdice.verdict import Verdict
 
 CONTACT_ATTRIBUTES = enum_attributes("contact law", list(LAWS))
 VERDICT_ATTRIBUTES = enum_attributes("verdict", [verdict.name.lower() for verdict in Verdict])
 AXIS_ATTRIBUTES = enum_attributes("Cartesian axis, z up", ["x", "y", "z"])
 
 
-def measure_variables(measures: Mapping[str, npt.NDArray[np.float64]], dims: tuple[str, ...]) -> dict[str, Any]:
-    """Return the variables of all measures, on the dimensions given."""
-    return {
-        name: (dims, values, {"long_name": MEASURES[name].LONG_NAME, "units": "1"}) for name, values in measures.items()
+CRITERION_ATTRIBUTES = enum_attributes("criterion", list(CRITERIA))
+
+# By the measure's name; those of steps that are counted.
+MEASURE_ATTRIBUTES = {
+    criterion.MEASURE: {"long_name": criterion.LONG_NAME, "units": "1"} for criterion in CRITERIA.values()
+}
+PHASE_ATTRIBUTES = {"long_name": "phase of the first touch-down within its time step", "units": "1"}
+STEPS_DONE_ATTRIBUTES = {"long_name": "steps done when the run ended", "units": "1"}
+STEPS_COMPUTED_ATTRIBUTES = {"long_name": "steps computed one by one, not skipped as free flight", "units": "1"}
+DECIDED_ATTRIBUTES = {"long_name": "step that decided the criterion, 0 if none before the end", "units": "1"}
+MEMBER_ATTRIBUTES = {"long_name": "member: number k of n is launched k/n of a time step late", "units": "1"}
+CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
+    "contact": CONTACT_ATTRIBUTES,
+    "stiffness": {"long_name": "ground stiffness", "units": "kg s-2"},
+    "steps": {"long_name": "number of time steps", "units": "1"},
+    "omega_h": {"long_name": "contact frequency of a flat landing times step size", "units": "1"},
+}
+
+
+def criterion_attributes(names: Sequence[str]) -> dict[str, Any]:
+    """Return the attributes of a dimension of the criteria asked."""
+    return enum_attributes("criterion", names)
+
+
+def criteria_text(tolerances: Mapping[str, float]) -> str:
+    """Return the criteria asked as one line of text."""
+    return "; ".join(
+        f"{name}: {CRITERIA[name].MEASURE} <= {CRITERIA[name].BASE + tolerance:g}"
+        for name, tolerance in tolerances.items()
+    )
+
+
+def run_variables(members: int) -> dict[str, Any]:
+    """Return the variables that a shard keeps of its runs, for one cell of so many members, without values."""
+    table = ("cell", "member")
+    numbers = np.zeros((1, members))
+    counts = np.zeros((1, members), np.int64)
+    return {name: (table, numbers, attributes) for name, attributes in MEASURE_ATTRIBUTES.items()} | {
+        "touchdown_phase": (table, numbers, PHASE_ATTRIBUTES),
+        "verdict": (table, np.zeros((1, members), np.int8), VERDICT_ATTRIBUTES),
+        "steps_done": (table, counts, STEPS_DONE_ATTRIBUTES),
+        "steps_computed": (table, counts, STEPS_COMPUTED_ATTRIBUTES),
+        "decided": ((*table, "criterion"), np.zeros((1, members, len(CRITERIA)), np.int64), DECIDED_ATTRIBUTES),
     }
 
 
@@ -49,10 +87,6 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, cod
         "scene_digest": scene.digest,
         "model": model,
         "scheme": scheme,
-        "verdict_criteria": "; ".join(
-            f"{name}: {criterion.measure} <= {1 + criterion.tolerance:g}"
-            for name, criterion in criteria_of(model).items()
-        ),
     }
 
 
@@ -70,19 +104,19 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         variables |= _rotation_variables(trajectory)
         nodes = np.arange(1, len(SIGNS) + 1, dtype=np.int8)
         coordinates["node"] = ("node", nodes, {"long_name": "node, numbered as in cube.m", "units": "1"})
-    variables |= measure_variables({name: value[0] for name, value in run.measures.items()}, ())
+    variables |= {
+        name: ((), value[0], MEASURE_ATTRIBUTES[name]) for name, value in run.measures.items() if not np.isnan(value[0])
+    }
+    variables["touchdown_phase"] = ((), run.touchdown_phase[0], PHASE_ATTRIBUTES)
     variables["verdict"] = ((), run.verdict[0], VERDICT_ATTRIBUTES)
-    variables["steps_done"] = (
-        (),
-        run.steps_done[0],
-        {"long_name": "steps within double range", "units": "1"},
-    )
+    variables["steps_done"] = ((), run.steps_done[0], STEPS_DONE_ATTRIBUTES)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, "stiffdice.simulate") | {
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,
         "step_size_units": "s",
         "omega_h": theory.omega_h(run.scene, run.steps),
         "angular_momentum_at_launch": np.array(run.scene.launch.spin),
+        "criteria": criteria_text(run.tolerances),
         "verdict_text": Verdict(run.verdict[0]).sentence,
     }
     return xr.Dataset(variables, coordinates, attributes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -17,10 +18,29 @@ def open_file(path: str | Path) -> xr.Dataset:
 
     A file from elsewhere is not trusted: links, external storage and virtual datasets are refused, checksums checked.
     """
-    try:
+    with _told(path):
         _inspect(Path(path))
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
             return dataset.load()
+
+
+def parts(path: str | Path, cells: int) -> Iterator[xr.Dataset]:
+    """Yield a file of runs part by part, so many cells at a time, loaded; raises InputError as `open_file` does."""
+    with _told(path):
+        _inspect(Path(path))
+        dataset = xr.open_dataset(path, engine="h5netcdf", decode_times=False)
+    with dataset:
+        for first in range(0, dataset.sizes["cell"], cells):
+            with _told(path):
+                part = dataset.isel(cell=slice(first, first + cells)).load()
+            yield part
+
+
+@contextmanager
+def _told(path: str | Path) -> Iterator[None]:
+    """Say in one line, with the file's name, what goes wrong while reading it."""
+    try:
+        yield
     except InputError as error:
         raise error.within(str(path)) from None
     except (OSError, KeyError, ValueError, RuntimeError) as error:

@@ -29,14 +29,21 @@ def write_bytes(data: bytes | memoryview, path: str | Path) -> None:
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        try:
-            with temporary.open("wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(target)
-        finally:
+        temporary.write_bytes(data)
+        store(temporary, target)
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+    finally:
+        with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def store(temporary: Path, target: Path) -> None:
+    """Give a finished file its name, once it is safely on disk; raises OutputError if it cannot."""
+    try:
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(target)
     except OSError as error:
         raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
     with contextlib.suppress(OSError):  # the file is there; some file systems cannot sync a folder

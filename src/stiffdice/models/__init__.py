@@ -1,4 +1,4 @@
-"""Which motion is computed. A model is a module with TAG, `force`, `kick` and `drift`; one line registers it."""
+"""Which motion is computed. A model is a module with the functions below and TAG; one line registers it."""
 
 from __future__ import annotations
 
@@ -22,3 +22,12 @@ kick = by_tag({type(module.TAG): module.kick for module in _MODULES.values()})
 
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
 drift = by_tag({type(module.TAG): module.drift for module in _MODULES.values()})
+
+# (model, physics, state, duration): turn the body at its present spin for so long [s], as in a free flight.
+turn = by_tag({type(module.TAG): module.turn for module in _MODULES.values()})
+
+# (model) -> whether the body turns.
+turns = by_tag({type(module.TAG): module.turns for module in _MODULES.values()})
+
+# (model, physics, state) -> how far below the centre a node can be in a free flight from this state on [m].
+extent = by_tag({type(module.TAG): module.extent for module in _MODULES.values()})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
-from stiffdice.contact import Wrench, height_of, node_force, reaches
+from stiffdice.contact import Wrench, height_of, lowest_of, node_force, reaches
 from stiffdice.state import Physics
 
 
@@ -48,3 +48,20 @@ def drift(physics: Physics, state: Any, h: float) -> None:
     state.position[0] += h * state.velocity[0]
     state.position[1] += h * state.velocity[1]
     state.position[2] += h * state.velocity[2]
+
+
+@njit
+def turn(physics: Physics, state: Any, duration: float) -> None:
+    """Do nothing: this model does not turn the cube."""
+
+
+@njit
+def turns() -> bool:
+    """Return that the body does not turn."""
+    return False
+
+
+@njit
+def extent(physics: Physics, state: Any) -> float:
+    """Return how far below the centre the lowest node is, in a free flight, too [m]."""
+    return lowest_of(physics, state)

@@ -57,13 +57,31 @@ def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
 def drift(physics: Physics, state: Any, h: float) -> None:
     """Advance position and orientation by h [s] at the state's velocity and spin (equations 7 and 9)."""
     sliding.drift(physics, state, h)
+    turn(physics, state, h)
+
+
+@njit
+def turn(physics: Physics, state: Any, duration: float) -> None:
+    """Turn the nodes for so long [s] at the spin that the angular momentum says (equation 9)."""
     wx = state.angular_momentum[0] / physics.inertia
     wy = state.angular_momentum[1] / physics.inertia
     wz = state.angular_momentum[2] / physics.inertia
     state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2] = wx, wy, wz
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     if rate > 0.0:
-        _rotate(state, wx / rate, wy / rate, wz / rate, rate * h)
+        _rotate(state, wx / rate, wy / rate, wz / rate, rate * duration)
+
+
+@njit
+def turns() -> bool:
+    """Return that the body turns."""
+    return True
+
+
+@njit
+def extent(physics: Physics, state: Any) -> float:
+    """Return how far below the centre a node can come, however the cube turns [m]."""
+    return physics.reach
 
 
 @njit

@@ -1,0 +1,347 @@
+"""Rest and rocking: the step size at which each contact mode of a cube on the ground goes unstable.
+
+Measured twice, on the compiled step itself. Linearised: a cube is pressed lightly into the ground on four, two or one
+of its nodes, and finite differences around that state give the linear map of one step; its spectral radius passes one
+at the limit. In time: a cube at rest on its face is nudged, and what becomes of the nudge is followed step by step
+while it is small against the sag. Above the limit that is for some ten steps; below it, too, for rocking with `corners`
+inertia, because at such a step the bounce is unstable and soon takes over. (A bounce of a `solid` cube stays alone
+where rocking is unstable: the torques of four nodes cancel to the last bit.)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from stiffdice import checks, schemes, theory
+from stiffdice.compiled import njit
+from stiffdice.contact import LAWS
+from stiffdice.cube import INERTIAS
+from stiffdice.errors import InputError
+from stiffdice.io import layout
+from stiffdice.io.enums import enum_attributes
+from stiffdice.models import MODELS
+from stiffdice.scene import Launch, Scene
+from stiffdice.simulate import simulate
+from stiffdice.state import STATE, Array, Physics, States, physics_of, rotated
+
+MODEL, SCHEME = "tumbling", "symplectic_euler"
+_TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
+
+# By mode: the axis about which a slight turn leaves four, two or one of the upright cube's nodes lowest. An edge and a
+# corner touch the ground with the longest arms when the cube is nearly flat; a steeper one has a lower frequency.
+_TILTS = {
+    "face_bounce": (0.0, 0.0, 0.0),
+    "face_rocking": (0.0, 0.0, 0.0),
+    "edge": (0.0, 1.0, 0.0),
+    "corner": (-1.0, 1.0, 0.0),
+}
+# The modes that a nudge to the cube at rest on its face brings out: vertically, and tipped.
+NUDGES = {"bounce": "face_bounce", "rocking": "face_rocking"}
+
+# In units of the side. The preload makes forces that topple the cube, relative to those that right it as preload to
+# side: an error of this order in ω². The difference must exceed round-off in a height, 1e-16, by as much. A quarter
+# of the preload keeps every force in one piece of max(0, S d − D u) up to ζ = 1.
+_PRELOAD = 4e-8
+_DIFFERENCE = _PRELOAD / 4
+_LIFT = 4 * _PRELOAD
+
+# Below the limit and without damping the spectral radius is one to round-off in a difference.
+_TINY = 1e-7
+
+# In units of the sag of the cube at rest: the nudge, and the motion of a node up to which it is followed.
+_NUDGE, _FOLLOWED = 1e-4, 1e-2
+# The sag in units of the side: room for all that above round-off, and a cube that still stands on its ground.
+_SAGS = 1e-7, 1e-1
+# ωh in units of its limit. Slower, a run's steps show too little of a swing; faster, the nudge is out of hand at once.
+_SCAN = 0.5, 1.15
+
+
+def measure(
+    scene: Scene,
+    *,
+    zeta: Sequence[float] = tuple(np.linspace(0, 1, 21)),
+    nudge_zeta: Sequence[float] = (0.0, 0.2),
+    omega_h_relative: Sequence[float] = tuple(np.linspace(0.9, 1.1, 41)),
+    steps: int = 300,
+) -> xr.Dataset:
+    """Return the measured limits of all modes, and the growth of a nudge around two of them.
+
+    scene: gives the cube's size and mass, the stiffness and gravity; the experiment sets inertia, damping and launch,
+    and puts the cube on level ground without friction under the gated law. zeta: damping ratios ζ = (D/S) ω/2 of each
+    mode itself, up to 1, for the linearised step. nudge_zeta, omega_h_relative, steps: damping ratios, ωh in units of
+    its limit, and steps at most for the nudged cube.
+    Dimensions inertia, mode, zeta; and inertia, nudge, nudge_zeta, omega_h_relative.
+    Relative accuracy: limits 2.5e-7, stored as `limit_error`; growth, but for the limit itself, 1e-6 for a sag of
+    2e-6 to 2e-4 of the side, 6e-4 on the softest ground that is allowed, 2e-5 on the hardest.
+
+    Raises InputError for a number out of range and for a scene in which the cube sinks too far or too little to nudge.
+    """
+    zeta = _numbers("zeta", zeta, 0.0, 1.0)
+    nudge_zeta = _numbers("nudge_zeta", nudge_zeta, 0.0, 1.0)
+    scan = _numbers("omega_h_relative", omega_h_relative, *_SCAN)
+    steps = checks.count("steps", steps, at_least=20)
+    scenes = [_on_level_ground(scene, inertia) for inertia in INERTIAS]
+    modes = [{name: _mode(level, name) for name in _TILTS} for level in scenes]
+    limits = np.array([[[_limit(mode, value) for value in zeta] for mode in row.values()] for row in modes])
+    nudged = np.array(
+        [
+            [
+                [[_nudged(level, row[name], value, part, steps) for part in scan] for value in nudge_zeta]
+                for name in NUDGES.values()
+            ]
+            for level, row in zip(scenes, modes, strict=True)
+        ]
+    )
+    return _dataset(scene, modes, zeta, limits, nudge_zeta, scan, nudged)
+
+
+def _numbers(key: str, values: Sequence[float], smallest: float, largest: float) -> list[float]:
+    numbers = [checks.number(key, value, "1") for value in values]
+    if not numbers or min(numbers) < smallest or max(numbers) > largest:
+        raise InputError(f"{key} = {checks.shown(values)}: allowed are numbers from {smallest:g} to {largest:g} [1]")
+    return numbers
+
+
+def _on_level_ground(scene: Scene, inertia: str) -> Scene:
+    cube = dataclasses.replace(scene.cube, inertia=inertia)
+    level = scene.with_ground(normal=(0.0, 0.0, 1.0), friction=0.0, damping=0.0, contact="gated")
+    stiffness = scene.ground.stiffness
+    lowest, highest = (part * cube.side for part in _SAGS)
+    if not lowest <= (_sag(scene) if stiffness > 0 else np.inf) <= highest:
+        raise InputError(
+            f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by m g/(4 S); "
+            f"allowed is {lowest:.3g} to {highest:.3g} [m]"
+        )
+    return dataclasses.replace(level, cube=cube)
+
+
+def _sag(scene: Scene) -> float:
+    """Return how deep the lower face lies at rest [m]."""
+    return scene.cube.mass * scene.gravity / (theory.BOUNCE_NODES * scene.ground.stiffness)
+
+
+class _Contact(NamedTuple):
+    """A cube on some of its nodes, and the pairs of states around it that differ in one coordinate each."""
+
+    scene: Scene
+    offsets: Array  # [m] (node, 3)
+    states: States  # (2 · 8,), all raised coordinates before all lowered ones
+    sizes: Array  # (8,) half the difference of a pair, in the units of `_weighted`
+
+
+class _Mode(NamedTuple):
+    """One mode of a contact."""
+
+    contact: _Contact
+    shape: Array  # (4,) of length one, in the first four of `_weighted`
+    square: float  # ω² as measured [rad²/s²]
+    predicted: float  # ω² by theory [rad²/s²]
+
+
+def _contact(scene: Scene, tilt: Sequence[float]) -> _Contact:
+    """Press the cube into the ground on the nodes that `tilt` leaves lowest."""
+    side, mass, inertia = scene.cube.side, scene.cube.mass, scene.cube.moment_of_inertia
+    offsets = rotated(scene.cube.node_offsets(), np.array(tilt) * _LIFT)
+    move = _DIFFERENCE * side * np.sqrt(mass)
+    sizes = np.repeat([move, move * np.sqrt(scene.ground.stiffness / mass)], 4)
+    states = np.zeros(16, STATE)
+    states["position"][:, 2] = -offsets[:, 2].min() - _PRELOAD * side
+    states["node_offset"] = offsets
+    for state, change in zip(states, np.concatenate([np.diag(sizes), np.diag(-sizes)]), strict=True):
+        state["position"][2] += change[0] / np.sqrt(mass)
+        state["node_offset"] = rotated(offsets, change[1:4] / np.sqrt(inertia))
+        state["velocity"][2] = change[4] / np.sqrt(mass)
+        state["angular_momentum"] = change[5:] * np.sqrt(inertia)
+        state["angular_velocity"] = change[5:] / np.sqrt(inertia)
+    return _Contact(scene, offsets, states, sizes)
+
+
+def _weighted(scene: Scene, offsets: Array, states: States) -> Array:
+    """Return height and rotation vector from `offsets`, then their rates, shape (state, 8), weighted by √M."""
+    mass, inertia = np.sqrt(scene.cube.mass), np.sqrt(scene.cube.moment_of_inertia)
+    return np.column_stack(
+        [
+            states["position"][:, 2] * mass,
+            _rotation(offsets, states["node_offset"]) * inertia,
+            states["velocity"][:, 2] * mass,
+            states["angular_momentum"] / inertia,
+        ]
+    )
+
+
+def _rotation(offsets: Array, turned: Array) -> Array:
+    """Return the small rotations [rad] that turn a cube's nodes, shape (node, 3), to (state, node, 3).
+
+    Σ r × (φ × r) = ⅔ Σ r² φ over a cube's nodes; exact to φ³.
+    """
+    rotation: Array = np.cross(offsets, turned).sum(axis=-2) / (2 / 3 * np.sum(offsets**2))
+    return rotation
+
+
+def _jacobian(contact: _Contact, damping: float, h: float) -> Array:
+    """Return the linear map of one compiled step around the pressed cube, shape (8, 8), by central differences.
+
+    The cube is not in balance: weight and preload drop out, being the same in both states of a pair.
+    """
+    physics = physics_of(contact.scene.with_ground(damping=damping))
+    after = contact.states.copy()
+    _step_each(*_TAGS, physics, after, h)
+    raised, lowered = np.split(_weighted(contact.scene, contact.offsets, after), 2)
+    jacobian: Array = ((raised - lowered) / (2 * contact.sizes[:, None])).T
+    return jacobian
+
+
+@njit(cache=True)
+def _step_each(scheme: Any, model: Any, law: Any, physics: Physics, states: States, h: float) -> None:
+    """Advance each state by one step of h [s]."""
+    for k in range(states.shape[0]):
+        schemes.step(scheme, model, law, physics, states[k], h)
+
+
+def _mode(scene: Scene, name: str) -> _Mode:
+    """Find a mode in the stiffness that the step itself shows: rates change by −h M⁻¹K times the displacements."""
+    contact = _contact(scene, _TILTS[name])
+    h = np.sqrt(scene.cube.mass / scene.ground.stiffness)
+    stiffness = -_jacobian(contact, 0.0, h)[4:, :4] / h
+    squares, shapes = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    bounce = np.argmax(np.abs(shapes[0]))
+    if name == "face_bounce":
+        found = bounce
+    elif name == "face_rocking":
+        found = np.argmax(np.where(np.arange(4) == bounce, 0.0, squares))
+    else:
+        found = np.argmax(squares)
+    touching = contact.offsets[:, 2] < contact.offsets[:, 2].min() + _PRELOAD * scene.cube.side
+    modes = theory.contact_modes(scene, scene.cube.node_offsets(), touching)
+    predicted = modes[np.argmin(np.abs(modes - squares[found]))]
+    return _Mode(contact, shapes[:, found], float(squares[found]), float(predicted))
+
+
+def _limit(mode: _Mode, zeta: float) -> float:
+    """Return the step size [s] at which the spectral radius of the step, seen in this mode, passes one.
+
+    By bisection, which is right here and nowhere in a sweep: contact is kept, so that the map is linear, and an
+    eigenvalue leaves the unit circle at −1 only, where (ωh)² + 4ζωh − 4 has its one positive root.
+    """
+    omega = np.sqrt(mode.predicted)
+    damping = 2 * zeta * mode.contact.scene.ground.stiffness / omega
+    inside = np.kron(np.eye(2), mode.shape[:, None])  # a motion in this mode alone, (8, 2)
+
+    def stable(h: float) -> bool:
+        step = inside.T @ _jacobian(mode.contact, damping, h) @ inside
+        return bool(np.abs(np.linalg.eigvals(step)).max() <= 1 + _TINY)
+
+    low, high = 0.0, 2 * theory.STABILITY_LIMIT / omega
+    while high - low > 1e-10 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> tuple[float, float]:
+    """Return the growth per step [1] of a nudge to the cube at rest, and the number of steps that show it.
+
+    zeta, relative: damping ratio, and ωh in units of its limit, of the nudged motion. A cube that is tipped at rest is
+    toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I.
+    """
+    half, sag = scene.cube.side / 2, _sag(scene)
+    tips = abs(mode.shape[0]) < 0.5
+    toppling = scene.cube.mass * scene.gravity * half / scene.cube.moment_of_inertia if tips else 0.0
+    omega = np.sqrt(mode.predicted - toppling)
+    h = relative * theory.stability_limit(zeta) / omega
+    lift, tip = (0.0, _NUDGE * sag / half) if tips else (_NUDGE * sag, 0.0)
+    launch = Launch(position=(0.0, 0.0, half - sag + lift), velocity=(0.0, 0.0, 0.0), orientation=(tip, 0.0, 0.0))
+    damped = scene.with_ground(damping=2 * zeta * omega * scene.ground.stiffness / mode.predicted)
+    run = simulate(
+        dataclasses.replace(damped, launch=launch, duration=h * steps),
+        model=MODEL,
+        scheme=SCHEME,
+        steps=steps,
+        every=1,
+    )
+    assert run.trajectory is not None
+    state, upright = run.trajectory.state, scene.cube.node_offsets()
+    motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
+    heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
+    gone = np.flatnonzero(np.abs(heights + sag).max(axis=1) > _FOLLOWED * sag)
+    last = int(gone[0]) - 1 if gone.size else len(state) - 1
+    return _growth(motion[: last + 1]), last
+
+
+def _growth(motion: Array) -> float:
+    """Return the factor [1] by which a motion of one mode grows in a step.
+
+    From step to step such a motion follows x₂ = a x₁ − b x₀: a and b by least squares, the growth is the larger
+    modulus of the roots of λ² = aλ − b. Unlike the last amplitude over the first, this does not take for growth what a
+    nudge swings up to in the end, near the limit many times its size. Where the two roots meet, at the limit without
+    damping, it is known to the root of the accuracy it has elsewhere.
+    """
+    a, b = np.linalg.lstsq(np.column_stack([motion[1:-1], -motion[:-2]]), motion[2:], rcond=None)[0]
+    return float(np.abs(np.roots([1.0, -a, b])).max())
+
+
+def _dataset(
+    scene: Scene,
+    modes: Sequence[Mapping[str, _Mode]],
+    zeta: Sequence[float],
+    limits: Array,
+    nudge_zeta: Sequence[float],
+    scan: Sequence[float],
+    nudged: Array,
+) -> xr.Dataset:
+    grid, scanned = ("inertia", "mode", "zeta"), ("inertia", "nudge", "nudge_zeta", "omega_h_relative")
+    unit = scene.ground.stiffness / scene.cube.mass
+    squares, predicted = (
+        np.array([[getattr(mode, name) for mode in row.values()] for row in modes]) for name in ("square", "predicted")
+    )
+    limit = limits * np.sqrt(predicted)[:, :, None]
+    theoretical = np.array([theory.stability_limit(value) for value in zeta])
+    growths = [[theory.growth(part * theory.stability_limit(value), value) for part in scan] for value in nudge_zeta]
+    variables: dict[str, Any] = {
+        name: (dims, values, {"long_name": meaning, "units": "1"})
+        for name, dims, values, meaning in (
+            ("mode_number", grid[:2], squares / unit, "k of omega^2 = k S/m, as the step shows it"),
+            ("mode_number_theory", grid[:2], predicted / unit, "k of omega^2 = k S/m by theory"),
+            ("limit", grid, limit, "omega h at which one step's spectral radius passes 1; omega of the mode by theory"),
+            ("limit_theory", ("zeta",), theoretical, "2 (sqrt(1 + zeta^2) - zeta)"),
+            ("limit_error", grid, limit / theoretical - 1, "measured limit over theory, minus 1"),
+            ("longest_step", grid, limits * np.sqrt(unit), "step size h at the measured limit, as h sqrt(S/m)"),
+            ("growth", scanned, nudged[..., 0], "factor by which a nudge to the cube at rest grows in a step"),
+            ("growth_theory", scanned[2:], growths, "the same by theory"),
+            (
+                "steps_followed",
+                scanned,
+                nudged[..., 1].astype(np.int32),
+                "steps that show it: until a node has moved by 1 % of the sag",
+            ),
+        )
+    }
+    attributes = layout.provenance_attributes(
+        "Limits of the contact modes", scene, MODEL, SCHEME, "stiffdice.experiments.rocking"
+    )
+    attributes["scene_note"] = (
+        "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
+    )
+    return xr.Dataset(variables, _coordinates(zeta, nudge_zeta, scan), attributes)
+
+
+def _coordinates(zeta: Sequence[float], nudge_zeta: Sequence[float], scan: Sequence[float]) -> dict[str, Any]:
+    enums = (
+        ("inertia", INERTIAS, "moment of inertia of the cube"),
+        ("mode", _TILTS, "contact mode"),
+        ("nudge", NUDGES, "nudge to a cube at rest on its face"),
+    )
+    numbers = (
+        ("zeta", zeta, "damping ratio of the mode itself, (D/S) omega/2"),
+        ("nudge_zeta", nudge_zeta, "damping ratio of the nudged motion"),
+        ("omega_h_relative", scan, "omega h of the nudged motion over its limit by theory"),
+    )
+    return {
+        name: (name, np.arange(len(meanings), dtype=np.int8), enum_attributes(text, list(meanings)))
+        for name, meanings, text in enums
+    } | {name: (name, values, {"long_name": text, "units": "1"}) for name, values, text in numbers}

@@ -1,0 +1,62 @@
+"""How many steps of a run are free flight for certain, so that a scheme's closed form can take them at once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from stiffdice import models
+from stiffdice.compiled import by_tag, njit
+from stiffdice.contact import Gated, Ungated
+from stiffdice.state import Physics
+
+# Fewer than this are stepped: looking ahead costs about as much.
+WORTHWHILE = 8
+
+
+@njit
+def _rising(model: Any, speed: float, sight: Any) -> float:
+    """Ungated: the force on a node is zero as long as it rises, which is known of all only where none turns."""
+    if models.turns(model) or speed < 0.0:
+        return 0.0
+    return speed / (sight.step_size * sight.pull) if sight.pull > 0.0 else math.inf
+
+
+@njit
+def _always(model: Any, speed: float, sight: Any) -> float:
+    """Gated: a node above the ground feels nothing."""
+    return math.inf
+
+
+# (law, model, speed, sight) -> for how many steps a body in the air at this speed along the normal [m/s] feels nothing.
+_undisturbed = by_tag({Ungated: _rising, Gated: _always})
+
+
+@njit
+def _until(room: Any, speed: Any, pull: Any, h: Any) -> Any:
+    """Return after how many steps of h [s] a body at `speed` [m/s] under `pull` [m/s²] has fallen by `room` [m]."""
+    if pull > 0.0:
+        root = math.sqrt(speed * speed + 2 * pull * room)
+        return ((speed + root) / pull if speed > 0.0 else 2 * room / (root - speed)) / h
+    if pull < 0.0 or speed >= 0.0:
+        return 0.0 if speed < 0.0 else math.inf
+    return room / -speed / h
+
+
+@njit
+def free_steps(model: Any, law: Any, physics: Physics, state: Any, sight: Any, most: int) -> int:
+    """Return a number of steps, at most `most`, in which no node touches the ground and no force but weight acts.
+
+    It need not be the greatest. Along the ground's normal the path is a parabola, open downwards, so that over any
+    number of steps it is lowest at an end.
+    """
+    if sight.flight < 2.0 or most < WORTHWHILE:
+        return 0
+    h = sight.step_size
+    # A scheme's path may be off the parabola by a step's move or two.
+    room = sight.height - models.extent(model, physics, state) - 4 * h * (abs(sight.speed) + h * abs(sight.pull))
+    if not room > 0.0:
+        return 0
+    steps = _until(room, sight.speed - h * sight.pull, sight.pull, h)
+    steps = min(steps, _undisturbed(law, model, sight.speed, sight))
+    return 0 if steps < WORTHWHILE else int(min(steps, float(most)))

@@ -1,0 +1,103 @@
+"""A file of many runs, written while they are made: what is in memory does not grow with what is in the file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5netcdf
+import numpy as np
+import xarray as xr
+
+from stiffdice.errors import OutputError
+from stiffdice.io.write import check_target, store
+
+# Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress.
+CHUNK_CELLS, CHUNK_MEMBERS = 16, 64
+
+
+class Spool:
+    """Writes a dataset of dimensions cell and member part by part; the file is there, whole, when the block ends.
+
+    pattern: a dataset of one cell and all members that says what there is: names, types, attributes, dimensions.
+    Equal parts in equal order give equal bytes. Raises OutputError if the file cannot be written; nothing is left then.
+    """
+
+    def __init__(self, path: str | Path, pattern: xr.Dataset) -> None:
+        self._target = check_target(path)
+        self._temporary = self._target.with_name(f".{self._target.name}.{os.getpid()}.part")
+        self._pattern = pattern
+        self.cells = 0
+
+    def __enter__(self) -> Spool:
+        try:
+            self._file = h5netcdf.File(self._temporary, "w")
+        except OSError as error:
+            raise OutputError(f"{self._target}: {error.strerror}; nothing was stored") from None
+        self._file.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
+        self._file.attrs.update(self._pattern.attrs)
+        for name, variable in self._pattern.variables.items():
+            self._create(str(name), variable)
+        return self
+
+    def _create(self, name: str, variable: xr.Variable) -> None:
+        sizes = {"cell": CHUNK_CELLS, "member": min(CHUNK_MEMBERS, self._pattern.sizes["member"])}
+        for dimension, size in variable.sizes.items():
+            if dimension not in self._file.dimensions:
+                self._file.dimensions[str(dimension)] = size
+        stored = self._file.create_variable(
+            name,
+            tuple(str(dimension) for dimension in variable.dims),
+            variable.dtype,
+            chunks=tuple(sizes.get(str(dimension), size) for dimension, size in variable.sizes.items()),
+            compression="gzip",
+            compression_opts=4,
+            shuffle=True,
+            fletcher32=True,
+        )
+        stored.attrs.update(variable.attrs)
+        labels = [str(label) for label in self._pattern.coords if label not in self._pattern.dims]
+        if name in self._pattern.data_vars and labels:
+            stored.attrs["coordinates"] = " ".join(labels)  # so that readers take them for such (CF)
+        if "cell" not in variable.dims:
+            stored[...] = variable.values
+
+    def add_cells(self, count: int) -> int:
+        """Make room for so many more cells, and return the number of the first."""
+        first, self.cells = self.cells, self.cells + count
+        self._file.resize_dimension("cell", self.cells)
+        return first
+
+    def put(self, values: Mapping[str, np.ndarray[Any, Any]], cells: slice, members: slice = slice(None)) -> None:
+        """Store values by name for some cells, and of those that have members for some of them."""
+        try:
+            for name, value in values.items():
+                variable = self._file.variables[name]
+                index = tuple(
+                    {"cell": cells, "member": members}.get(dimension, slice(None)) for dimension in variable.dimensions
+                )
+                variable[index] = value
+        except OSError as error:
+            raise self._told(error) from None
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self._file.close()
+            if kind is None:
+                store(self._temporary, self._target)
+        except (OSError, RuntimeError) as failure:
+            if kind is None:  # otherwise what ended the block is told
+                raise self._told(failure) from None
+        finally:
+            self._temporary.unlink(missing_ok=True)
+
+    def _told(self, error: OSError | RuntimeError) -> OutputError:
+        """Return in one line what HDF5 says in many."""
+        number = error.errno if isinstance(error, OSError) else None
+        reason = os.strerror(number) if number else str(error).splitlines()[0]
+        return OutputError(f"{self._target}: {reason}; nothing was stored")

@@ -1,0 +1,25 @@
+# Questions that are no sweep: one experiment, one file.
+
+
+rule experiment:
+    input:
+        scene=lambda wildcards: planned_experiment(wildcards).scene,
+    output:
+        "results/{study}/experiments/{experiment}.h5",
+    params:
+        experiment=lambda wildcards: planned_experiment(wildcards),
+        code=lambda wildcards: code_of(
+            "experiment.py", EXPERIMENTS[planned_experiment(wildcards).measure].module, "stiffdice.io.write"
+        ),
+    log:
+        "results/{study}/logs/experiment/{experiment}.log",
+    benchmark:
+        "results/{study}/benchmarks/experiment/{experiment}.tsv"
+    priority: 20
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/experiment.py"

@@ -1,0 +1,20 @@
+"""Make one experiment and store what it found."""
+
+from typing import Any
+
+from job import Stopwatch, logged
+
+from stiffdice import scene as scenes
+from stiffdice.catalogue import EXPERIMENTS
+from stiffdice.io.write import write_dataset
+
+snakemake: Any  # Snakemake puts it here
+
+planned = snakemake.params.experiment
+with logged(snakemake.log[0]) as say:
+    scene = scenes.load(planned.scene, planned.changes)
+    watch = Stopwatch()
+    with watch.running():
+        found = EXPERIMENTS[planned.measure].load()(scene, **planned.options)
+    write_dataset(found, snakemake.output[0])
+    say(f"simulation: {watch.seconds:.3f} s")

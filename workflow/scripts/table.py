@@ -1,0 +1,19 @@
+"""Tell what sweeps or experiments found as a table, for people and for programs."""
+
+from typing import Any
+
+from job import logged
+
+from stiffdice.catalogue import TABLES
+from stiffdice.io.read import open_file
+from stiffdice.io.write import write_bytes
+
+snakemake: Any  # Snakemake puts it here
+
+planned = snakemake.params.table
+with logged(snakemake.log[0]) as say:
+    data = {name: open_file(path) for name, path in snakemake.input.items()}
+    table = TABLES[planned.draw].load()(data, planned.title)
+    write_bytes(table.markdown.encode(), snakemake.output.markdown)
+    write_bytes(table.csv.encode(), snakemake.output.csv)
+    say(f"{planned.draw} told")
