@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install paper stability study report test lint types check lock clean
+.PHONY: help install paper stability extremes study report test lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -24,6 +24,9 @@ paper: $(READY)  ## rebuild everything the paper shows, into results/paper/
 
 stability: $(READY)  ## measure what "stable" means, into results/stability/
 	@$(BIN)/python workflow/run.py --cores $(CORES) stability
+
+extremes: $(READY)  ## where and how runs fail at the extremes, into results/extremes/
+	@$(BIN)/python workflow/run.py --cores $(CORES) extremes
 
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'

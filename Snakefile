@@ -2,6 +2,7 @@
 #
 #   snakemake paper                       everything the paper shows
 #   snakemake stability                   what "stable" means, measured
+#   snakemake extremes                    where and how runs fail at the extremes
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -30,6 +31,11 @@ rule paper:
 rule stability:
     input:
         lambda wildcards: everything_of("stability"),
+
+
+rule extremes:
+    input:
+        lambda wildcards: everything_of("extremes"),
 
 
 rule study:

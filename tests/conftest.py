@@ -6,10 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from stiffdice import study, sweep
 from stiffdice.io.read import parts
 from stiffdice.scene import Scene, from_mapping
+
+# The first call of a kernel may compile it.
+settings.register_profile("stiffdice", deadline=None)
+settings.load_profile("stiffdice")
+
+
+def pytest_collection_modifyitems(items):
+    """Put the workflow's tests first: they take longest, and a worker takes a file at a time."""
+    items.sort(key=lambda item: item.get_closest_marker("workflow") is None)
+
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = Path(__file__).parent / "reference"

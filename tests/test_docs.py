@@ -17,7 +17,7 @@ from stiffdice.criteria import CRITERIA
 from stiffdice.scene import PRESETS, Scene
 
 ROOT = Path(__file__).parent.parent
-PAGES = ["README.md", "config/README.md", "results/README.md", "docs/method.md", "CHANGELOG.md"]
+PAGES = ["README.md", "config/README.md", "results/README.md", "docs/method.md", "docs/stability.md", "CHANGELOG.md"]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -39,11 +39,14 @@ DRAWINGS: dict[str, Entry] = {
     "bounce-map": Entry(f"{_FIGURES}.bounce_map", "draw", "experiments", "bounce-map"),
     "rocking": Entry(f"{_FIGURES}.rocking", "draw", "experiments", "rocking"),
     "ledger": Entry(f"{_FIGURES}.ledger", "draw", "experiments", "ledger"),
+    "atlas": Entry(f"{_FIGURES}.atlas", "draw", "experiments", "extremes"),
+    "chatter": Entry(f"{_FIGURES}.chatter", "draw", "experiments", "chatter"),
 }
 
 # (datasets by name, title) -> a table.
 TABLES: dict[str, Entry] = {
     "answers": Entry("stiffdice.answers", "table", "sweeps"),
+    "precision": Entry("stiffdice.precision", "table", "experiments", "precision"),
 }
 
 # (scene, **options) -> a dataset; the function's keyword arguments are the options, with their defaults.
@@ -51,4 +54,7 @@ EXPERIMENTS: dict[str, Entry] = {
     "bounce-map": Entry("stiffdice.experiments.bounce_map", "measure"),
     "rocking": Entry("stiffdice.experiments.rocking", "measure"),
     "ledger": Entry("stiffdice.experiments.ledger", "measure"),
+    "extremes": Entry("stiffdice.experiments.extremes", "measure"),
+    "chatter": Entry("stiffdice.experiments.chatter", "measure"),
+    "precision": Entry("stiffdice.experiments.precision", "measure"),
 }

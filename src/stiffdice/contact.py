@@ -80,6 +80,22 @@ def lowest_of(physics: Any, state: Any) -> float:
 
 
 @njit
+def room_of(physics: Any, state: Any) -> float:
+    """Return how much higher than the four lowest nodes the others are [m]; 0 if those are not at one height."""
+    lowest = -lowest_of(physics, state)
+    flat = 1e-9 * physics.reach
+    touching, others = 0, math.inf
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        above = physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2] - lowest
+        if above <= flat:
+            touching += 1
+        else:
+            others = min(others, above)
+    return others if touching == 4 else 0.0
+
+
+@njit
 def node_force(law: Any, physics: Any, depth: float, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
     """Return the force on one node [N]: its weight, the normal force and friction, added in the listings' order.
 

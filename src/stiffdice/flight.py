@@ -13,6 +13,16 @@ from stiffdice.state import Physics
 # Fewer than this are stepped: looking ahead costs about as much.
 WORTHWHILE = 8
 
+# In units in the last place of the height: a step that moves the cube by less is taken, because stepping loses part of
+# it to round-off, half a unit at most, and the same again in the next step.
+_LOST = 1024
+
+
+@njit
+def lost(sight: Any) -> bool:
+    """Return whether steps are so short that round-off shows in the distance they go."""
+    return sight.step_size * abs(sight.speed) < _LOST * 2.0**-52 * abs(sight.height)
+
 
 @njit
 def _rising(model: Any, speed: float, sight: Any) -> float:
@@ -50,7 +60,7 @@ def free_steps(model: Any, law: Any, physics: Physics, state: Any, sight: Any, m
     It need not be the greatest. Along the ground's normal the path is a parabola, open downwards, so that over any
     number of steps it is lowest at an end.
     """
-    if sight.flight < 2.0 or most < WORTHWHILE:
+    if sight.flight < 2.0 or most < WORTHWHILE or lost(sight):
         return 0
     h = sight.step_size
     # A scheme's path may be off the parabola by a step's move or two.

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, schemes, watch
+from stiffdice import checks, phases, schemes, watch
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.criteria import MEMORY, limits_of, open_of, tolerances_of, values
@@ -60,7 +60,7 @@ class Run:
     tolerances: of the criteria the run was asked. measures: values by name, shape (member,). steps_done: int64
     (member,): fewer than `steps` where the run was stopped, all being decided, or left the range of doubles.
     decided: int64 (member, criterion), the step that decided a criterion, in the registry's order; 0 if none did before
-    the end. steps_computed: int64 (member,), those not skipped as free flight. verdict: int8 (member,), a `Verdict`.
+    the end. steps_computed: int64 (member,), those not taken at once. verdict: int8 (member,), a `Verdict`.
     end: the last state, shape (member, ...).
     """
 
@@ -100,12 +100,12 @@ def simulate(
 ) -> Run:
     """Run the simulator and return what happened.
 
-    every: keep every K-th state, from the launch on; None keeps none, and takes free flights in one step each, which
-    agrees with stepping to round-off. members: the launches of an ensemble; None runs the scene's own launch.
-    criteria: tolerances of those that the verdict asks; None asks the default ones. stop: end a run as soon as all of
-    these criteria are decided at these tolerances. references: what `trajectory` compares with, one for all or one for
-    each member (`reference.make`). budget: most steps to compute one by one; a run that needs more ends undecided.
-    progress: called with the fraction done, some times a second.
+    every: keep every K-th state, from the launch on; None keeps none, and takes many steps at once where their motion
+    is known (`flight.py`, `phases.py`), which agrees with stepping to round-off. members: the launches of an ensemble;
+    None runs the scene's own launch. criteria: tolerances of those that the verdict asks; None asks the default ones.
+    stop: end a run as soon as all of these criteria are decided at these tolerances. references: what `trajectory`
+    compares with, one for all or one for each member (`reference.make`). budget: most steps to compute one by one; a
+    run that needs more ends undecided. progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, and a trajectory too large to hold.
     """
@@ -130,7 +130,7 @@ def simulate(
     watched.memory["limits"] = limits_of({} if stop is None else stop)
     if every is not None:
         samples[0] = ensemble[0]
-    _begin(physics, ensemble, watched.memory, watched.sight, h, late, schemes.LAGS[scheme])
+    _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, schemes.LAGS[scheme])
 
     reached, chunk = 0, steps if progress is None else 20_000
     while reached < steps:
@@ -158,8 +158,8 @@ def simulate(
 
     found = values(watched.memory)
     endings = {
-        Verdict.SANK: _sunk(physics, ensemble),
-        Verdict.STALLED: _stalled(scene, launches, ensemble, watched.steps_done == steps),
+        Verdict.SANK: _sunk(physics, ensemble, watched),
+        Verdict.STALLED: _stalled(launches, h),
         Verdict.UNDECIDED: (watched.steps_done < steps) & (watched.steps_computed >= most),
     }
     return Run(
@@ -205,12 +205,14 @@ def _begin(
     memory: npt.NDArray[np.void],
     sight: npt.NDArray[np.void],
     h: float,
+    steps: int,
     late: Array,
     lag: float,
 ) -> None:
     """Let everything that watches a run look at its launch."""
     for m in range(ensemble.shape[0]):
         watch.start(sight[m], physics, ensemble[m], h, late[m], lag)
+        sight[m].steps = steps
         criteria_start(memory[m], sight[m], physics, ensemble[m])
 
 
@@ -235,8 +237,8 @@ def _march(
 ) -> None:
     """Advance every member to step `stop`, watching each step and keeping every K-th.
 
-    Between samples nothing is skipped; without samples, free flight is taken in one step, past `stop` if it is longer,
-    so that where to stop changes nothing.
+    Between samples nothing is skipped; without samples, motion that is known is taken at once, past `stop` if it lasts
+    longer, so that where to stop changes nothing.
     """
     for m in range(ensemble.shape[0]):
         state, seen, remembered = ensemble[m], sight[m], memory[m]
@@ -245,12 +247,14 @@ def _march(
         done = steps_done[m]
         until_kept = every - done % every if every > 0 else -1
         while done < stop and undecided > 0 and remembered.finite[0] == 0.0:
-            flown = 0
+            flown = skipped = 0
             if every == 0:
                 most = steps - done
                 if reference.horizon >= seen.time:  # it is compared at least as often as the reference is known
                     most = min(most, 1 + int(reference.spacing / h))
                 flown = free_steps(model, law, physics, state, seen, most)
+                if flown == 0 and steps_computed[m] < budget:
+                    skipped = phases.skip(scheme, model, law, physics, state, seen, most)
             if flown > 0:
                 schemes.flight(scheme, model, physics, state, h, flown)
             elif steps_computed[m] >= budget:
@@ -258,7 +262,7 @@ def _march(
             else:
                 schemes.step(scheme, model, law, physics, state, h)
                 steps_computed[m] += 1
-            step = done + max(1, flown)
+            step = done + skipped + max(1, flown)
             watch.observe(seen, physics, state, step, flown)
             undecided -= criteria_observe(remembered, step, seen, law, physics, state, reference)
             if remembered.finite[0] > 0.0:
@@ -271,20 +275,25 @@ def _march(
         steps_done[m] = done
 
 
-def _sunk(physics: Physics, ensemble: States) -> npt.NDArray[np.bool_]:
-    """Return whether every node ended below the ground, shape (member,)."""
+def _sunk(physics: Physics, ensemble: States, watched: Watched) -> npt.NDArray[np.bool_]:
+    """Return whether every node ended below the ground, shape (member,), and not just in the middle of a bounce.
+
+    A bounce ends, if the cube rests with its upper nodes out, and is no deeper than the energy of the launch takes it.
+    """
     normal = np.array([physics.nx, physics.ny, physics.nz])
     with np.errstate(all="ignore"):  # a run that blew up has infinite heights
         heights = (ensemble["position"][:, None, :] + ensemble["node_offset"]) @ normal
-    return np.asarray((heights < 0).all(axis=1))
+        fall = np.sqrt(watched.memory["energy"][:, 2] / (2 * physics.stiffness))
+    sag = watched.sight["sag"]
+    bounces = (sag < physics.side) & (-heights.min(axis=1) <= 2 * sag + fall)
+    return np.asarray((heights < 0).all(axis=1) & ~bounces)
 
 
-def _stalled(scene: Scene, launches: States, ensemble: States, whole: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return whether a cube never moved although its speed says it should have, shape (member,)."""
-    still = (launches["position"] == ensemble["position"]).all(axis=1)
-    with np.errstate(all="ignore"):  # a run that blew up has infinite speeds
-        way = np.abs(ensemble["velocity"]).max(axis=1) * scene.duration
-    return np.asarray(whole & still & (way > 1e-6 * scene.cube.radius))
+def _stalled(launches: States, h: float) -> npt.NDArray[np.bool_]:
+    """Return whether a step at the speed of the launch is lost in round-off of the place, shape (member,)."""
+    place, speed = launches["position"], launches["velocity"]
+    with np.errstate(over="ignore"):  # launches may be anything
+        return np.asarray(((speed != 0) & (place + h * speed == place)).any(axis=1))
 
 
 def _trajectory(scene: Scene, physics: Physics, samples: States, every: int, steps: int, steps_done: int) -> Trajectory:

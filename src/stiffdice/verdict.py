@@ -25,6 +25,7 @@ class Verdict(IntEnum):
     OFF_TRAJECTORY = 7
     STALLED = 8
     UNDECIDED = 9
+    UNRESOLVED = 10
 
     @property
     def sentence(self) -> str:
@@ -34,13 +35,14 @@ class Verdict(IntEnum):
 
 _SENTENCES = {
     Verdict.PASSED: "passed: every criterion asked holds",
+    Verdict.UNRESOLVED: "unresolved: passed, with steps longer than the linear limit of a force it met, or half a turn",
     Verdict.OFF_TRAJECTORY: "off trajectory: the cube was farther from the reference than allowed",
     Verdict.RESTITUTION_OFF: "restitution off: a bounce gave back more or less than the contact law does",
     Verdict.APEX_ROSE: "apex rose: a rebound went higher than the one before",
     Verdict.ENERGY_GREW: "energy grew: the cube had more energy in the air than at the launch",
-    Verdict.SANK: "sank: the whole cube was below the ground at the end",
-    Verdict.STALLED: "stalled: the steps are too short for double precision to move the cube",
+    Verdict.SANK: "sank or tunnelled: the whole cube was below the ground at the end, deeper than a bounce",
     Verdict.UNDECIDED: "undecided: the budget of computed steps was spent before the end",
+    Verdict.STALLED: "stalled: the steps are too short for double precision to move the cube",
     Verdict.BLEW_UP: f"blew up: the airborne energy passed {BLOW_UP:g} times the start's",
     Verdict.LEFT_NUMERIC_RANGE: "left the numeric range: a number grew past what double precision holds",
 }

@@ -14,20 +14,23 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
-from stiffdice.contact import height_of, lowest_of, speed_of
+from stiffdice.contact import height_of, lowest_of, room_of, speed_of
 from stiffdice.state import Physics
 
-# Of one run. Constants: step_size [s], late [s] (how far along the scene's flight the launch is), lag [steps], pull
-# (gravity towards the ground, along its normal) [m/s²], sag [m] (how deep a cube at rest sinks in).
+# Of one run. Constants: step_size [s], steps (of the whole run, set by who makes it), late [s] (how far along the
+# scene's flight the launch is), lag [steps], pull (gravity towards the ground, along its normal) [m/s²], sag [m] (how
+# deep a cube at rest sinks in, at most its side), room [m] (how much higher than the four lowest nodes the others are
+# at the launch; 0 if those are not level).
 # Of the last step: time [s] since the scene's launch, clearance of the lowest node [m], speed away from the ground
 # [m/s] and the speed one step before; flight: how many steps in a row have been in the air; lifted: 1 if in this step a
-# flight after a bounce became known. Of the last bounce: speed_in, speed_out [m/s] at zero clearance, NaN if unknown.
+# flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
+# change any more (`phases.py`). Of the last bounce: speed_in, speed_out [m/s] at zero clearance, NaN if unknown.
 SIGHT = np.dtype(
     [
         (name, np.float64)
         for name in (
-            *("step_size", "late", "lag", "pull", "sag"),
-            *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted"),
+            *("step_size", "steps", "late", "lag", "pull", "sag", "room"),
+            *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted", "still", "held"),
             *("speed_in", "speed_out", "bounces", "touchdown_phase"),
         )
     ]
@@ -52,8 +55,10 @@ def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: 
     sight.lag = lag
     sight.pull = physics.gravity * physics.nz
     sight.sag = 0.0
-    if sight.pull > 0.0 and physics.stiffness > 0.0:
-        sight.sag = physics.mass * sight.pull / 4 / physics.stiffness
+    if sight.pull > 0.0:
+        hardly = physics.mass * sight.pull < 4 * physics.stiffness * physics.side
+        sight.sag = physics.mass * sight.pull / 4 / physics.stiffness if hardly else physics.side
+    sight.room = room_of(physics, state)
     sight.time = late
     sight.height = height_of(physics, state)
     sight.speed = speed_of(physics, state)
@@ -62,6 +67,8 @@ def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: 
     # A launch in the air is amid its flight, not at the start of one.
     sight.flight = 2.0 if sight.clearance > 0.0 else 0.0
     sight.lifted = 0.0
+    sight.still = 0.0
+    sight.held = 0.0
     sight.speed_in = math.nan
     sight.speed_out = math.nan
     sight.bounces = 0.0
@@ -93,6 +100,7 @@ def observe(sight: Any, physics: Physics, state: Any, step: int, flown: int) -> 
             if sight.flight > 1.0:
                 sight.speed_in = _at_the_ground(sight, sight.speed, sight.speed_before, sight.clearance)
         sight.flight = 0.0
+    sight.still = 1.0 if flown == 0 and height == sight.height and speed == sight.speed else 0.0
     sight.time = sight.late + step * h
     sight.height = height
     sight.clearance = clearance

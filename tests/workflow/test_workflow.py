@@ -59,10 +59,12 @@ pytestmark = pytest.mark.workflow
 class Project:
     """A copy of the project whose files a test may change."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, *, own_source: bool = False):
         self.folder = folder
-        for name in ("workflow", "config", "src"):
+        for name in ("workflow", "config", *(["src"] if own_source else [])):
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+        if not own_source:  # another place would be compiled again
+            (folder / "src").symlink_to(ROOT / "src")
         shutil.copy(ROOT / "Snakefile", folder)
         (folder / "profiles").symlink_to("workflow/profiles")
         (folder / "results").mkdir()
@@ -78,7 +80,7 @@ class Project:
     def environment(self) -> dict[str, str]:
         # A proxy that is not there: whatever asks the network fails.
         away = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
-        return {**os.environ, **away, "PYTHONPATH": str(self.folder / "src")}
+        return {**os.environ, **away, "PYTHONPATH": str((self.folder / "src").resolve())}
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -108,7 +110,7 @@ class Project:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     """A project whose study has run; tests that change it take their changes back."""
-    project = Project(tmp_path_factory.mktemp("finished"))
+    project = Project(tmp_path_factory.mktemp("finished"), own_source=True)
     done = project.snakemake()
     assert done.returncode == 0, done.stderr
     return project

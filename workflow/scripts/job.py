@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 # The library of this checkout, installed or not: the one whose digest the workflow computed.
-sys.path.insert(0, str(Path(__file__).parents[2] / "src"))
+sys.path.insert(0, str((Path(__file__).parents[2] / "src").resolve()))
 
 from stiffdice.errors import StiffdiceError
 

@@ -43,4 +43,4 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
         if before > 0.0:
             slots[0] = max(slots[0], now / before)
         slots[1] = now
-    return slots[0], False
+    return slots[0], sight.held > 0.0

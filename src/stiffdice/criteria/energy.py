@@ -43,7 +43,7 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.flight > 0.0:
         slots[0] = max(slots[0], 1.0 + (_flying(sight, physics, state) - slots[1]) / slots[2])
-    return slots[0], False
+    return slots[0], sight.held > 0.0
 
 
 @njit

@@ -11,7 +11,7 @@ from typing import Any
 
 from stiffdice import exact
 from stiffdice.compiled import njit
-from stiffdice.contact import lowest_of
+from stiffdice.contact import room_of
 from stiffdice.state import Physics
 from stiffdice.verdict import Verdict
 from stiffdice.watch import settled
@@ -36,7 +36,7 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
     """Return the measure so far, and whether nothing can change it any more; not-a-number after any other landing."""
     blow = sight.speed_in * sight.speed_in / 2
     if sight.lifted > 0.0 and blow > 0.0 and blow >= settled(sight) and sight.pull >= 0.0 and physics.stiffness > 0.0:
-        free = _free_depth(physics, state)
+        free = room_of(physics, state)
         # An undamped cube goes deepest: its sag twice, and v/ω.
         depth = 2 * sight.sag + sight.speed_in * math.sqrt(physics.mass / 4 / physics.stiffness)
         if depth < free and not math.isnan(slots[0]):
@@ -44,20 +44,4 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
             slots[0] = max(slots[0], abs(sight.speed_out - out) / sight.speed_in)
         elif free == 0.0:
             slots[0] = math.nan
-    return slots[0], False
-
-
-@njit
-def _free_depth(physics: Physics, state: Any) -> float:
-    """Return how much higher than the four lowest nodes the others are [m]; 0 if those are not at one height."""
-    lowest = -lowest_of(physics, state)
-    flat = 1e-9 * physics.reach
-    touching, others = 0, math.inf
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        above = physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2] - lowest
-        if above <= flat:
-            touching += 1
-        else:
-            others = min(others, above)
-    return others if touching == 4 else 0.0
+    return slots[0], sight.held > 0.0

@@ -33,6 +33,21 @@ CRITERION_LOOKS: dict[str, dict[str, str]] = {
     "restitution": {"color": GREEN, "first": "o", "last": "p"},
     "trajectory": {"color": PURPLE, "first": "<", "last": ">"},
 }
+# Of a verdict, from mild to grave: colour, and a hatch, if any.
+VERDICT_LOOKS: dict[str, dict[str, str]] = {
+    "passed": {"color": "#ededed"},
+    "unresolved": {"color": "#ededed", "hatch": "....."},
+    "off_trajectory": {"color": "#CCBB44"},
+    "restitution_off": {"color": GREEN},
+    "apex_rose": {"color": "#F0E442"},
+    "energy_grew": {"color": ORANGE},
+    "sank": {"color": "#56B4E9"},
+    "undecided": {"color": "#ffffff", "hatch": "//////"},
+    "stalled": {"color": PURPLE},
+    "blew_up": {"color": "#B33C00"},
+    "left_numeric_range": {"color": INK},
+}
+
 _CRITERION_WORDS = {
     "finite": "numbers stay finite",
     "energy": "airborne energy ≤ {0:g} E₀",

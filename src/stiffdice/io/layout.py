@@ -34,7 +34,7 @@ MEASURE_ATTRIBUTES = {
 }
 PHASE_ATTRIBUTES = {"long_name": "phase of the first touch-down within its time step", "units": "1"}
 STEPS_DONE_ATTRIBUTES = {"long_name": "steps done when the run ended", "units": "1"}
-STEPS_COMPUTED_ATTRIBUTES = {"long_name": "steps computed one by one, not skipped as free flight", "units": "1"}
+STEPS_COMPUTED_ATTRIBUTES = {"long_name": "steps computed one by one, not many at once", "units": "1"}
 DECIDED_ATTRIBUTES = {"long_name": "step that decided the criterion, 0 if none before the end", "units": "1"}
 MEMBER_ATTRIBUTES = {"long_name": "member: number k of n is launched k/n of a time step late", "units": "1"}
 CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {

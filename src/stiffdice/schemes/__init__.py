@@ -1,4 +1,4 @@
-"""Time-stepping schemes. A scheme is a module with TAG, LAG, `step` and `flight`; one line registers it."""
+"""Time-stepping schemes. A scheme is a module with TAG, LAG, `step`, `flight` and `swing`; one line registers it."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ step = by_tag({type(module.TAG): module.step for module in _MODULES.values()})
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
 flight = by_tag({type(module.TAG): module.flight for module in _MODULES.values()})
+
+# (scheme, place, speed, h, steps, square, rate, constant) -> the change of place and the new speed after so many steps
+# at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off.
+swing = by_tag({type(module.TAG): module.swing for module in _MODULES.values()})
 
 # By how many steps a scheme's velocity is behind its place: in free flight the path's slope is u + LAG·(u − u_before).
 LAGS: dict[str, float] = {name: module.LAG for name, module in _MODULES.items()}
