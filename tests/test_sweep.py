@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from stiffdice.io.read import open_file
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
 from stiffdice.verdict import Verdict
-from tests.conftest import each
+from tests.conftest import ROOT, each
 
 DEFAULTS = {"finite": 0.0, "energy": 0.05, "apex": 0.02}
 
@@ -319,3 +321,25 @@ def test_the_scan_is_where_theory_says_trouble_is(collected, plan):
     failing = gated.failing.values[list(plan.criteria).index("energy")]
     assert (failing[gated.omega_h.values > theory.STABILITY_LIMIT] == plan.members).mean() > 0.9
     assert (failing[gated.omega_h.values < 0.25] == 0).all()
+
+
+PEAK = """
+import dataclasses, resource, sys
+from stiffdice import study, sweep
+plan = study.load("config/quick.yaml", "workflow/schemas/study.schema.yaml").sweeps["steps-needed"]
+plan = dataclasses.replace(plan, members=int(sys.argv[1]), contact=("gated",))
+sweep.compute(plan, plan.columns()[:1], sys.argv[2])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
+"""
+
+
+def test_memory_does_not_grow_with_the_members(tmp_path):
+    """Fifty times as many runs; kept in memory, their measures alone would be 50 MB."""
+
+    def peak(members):
+        command = [sys.executable, "-c", PEAK, str(members), str(tmp_path / f"{members}.h5")]
+        return int(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+
+    few, many = peak(128), peak(6400)
+    assert (tmp_path / "6400.h5").stat().st_size > 20 * (tmp_path / "128.h5").stat().st_size
+    assert many - few < 20_000
