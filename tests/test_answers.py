@@ -69,3 +69,27 @@ def test_the_stiffest_ground_that_all_have_is_told():
     assert "S = 1e+06 kg/s²" in answers.table({"a": stiff}, "A").markdown
     with pytest.raises(InputError, match="a stiffness in common"):
         answers.table({"a": soft, "b": stiff}, "A")
+
+
+def test_ends_of_a_scan_are_only_bounds():
+    found = told({"one": frontier(1e6, [19_000, 20_000, 21_000], [0, 0, 0])})
+    assert found["fewest steps at which every member passes"] == "19,000 or fewer"
+    assert found["steps from which on every member passes"] == "19,000 or fewer"
+    found = told({"one": frontier(1e6, [19_000, 20_000, 21_000], [0, 0, 1])})
+    assert found["most steps at which a member fails"] == "21,000 or more"
+
+
+def test_a_window_is_told_only_where_it_was_looked_for():
+    found = told({"one": frontier(1e6, [2_000, 2_100], [0, 0])})
+    assert found["steps about 20,000 at which every member passes"] == "not scanned"
+
+
+def test_sweeps_of_another_kind_are_not_merged():
+    one, other = frontier(1e6, [20_000], [0]), frontier(1e6, [20_000], [0])
+    other["tolerance"] = other.tolerance + 1
+    with pytest.raises(InputError, match="asks apex at another tolerance"):
+        answers.table({"one": one, "other": other}, "A")
+    other = frontier(1e6, [20_000], [0])
+    other.attrs["scene_digest"] = "0" * 64
+    with pytest.raises(InputError, match="sweep other has another scene"):
+        answers.table({"one": one, "other": other}, "A")

@@ -408,3 +408,21 @@ def test_the_schema_knows_what_the_code_knows(study_schema):
     text = study_schema.read_text()
     for registry in (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, CRITERIA):
         assert not [name for name in registry if f" {name}," in text or f"[{name}" in text]
+
+
+@pytest.mark.parametrize("tilt", ["launch.orientation=[0.3, 0.2, 0]", "ground.normal=[0.2, 0, 1]"])
+def test_restitution_is_not_asked_where_it_is_not_known(sweep_of, tilt):
+    with pytest.raises(InputError, match=r"criteria\.restitution: .*lands tilted"):
+        sweep_of(set=[tilt], criteria={"restitution": 0.05})
+    assert sweep_of(set=[tilt], criteria={"energy": 0.05})
+    assert sweep_of(set=["launch.orientation=[0, 0, 0.7]"], criteria={"restitution": 0.05})
+
+
+def test_a_sweeps_ground_is_not_set_by_the_back_door(sweep_of):
+    with pytest.raises(InputError, match="the sweep sets this itself"):
+        sweep_of(set=["ground={stiffness: 5}"])
+
+
+def test_a_criterion_that_is_none_is_told_though_no_sweep_asks_it(changed):
+    with pytest.raises(InputError, match=r"criteria\.speed: unknown; allowed are finite, energy"):
+        changed({"criteria": {"speed": 1}, "sweeps": None, "figures": None})

@@ -39,13 +39,14 @@ def table(sweeps: Mapping[str, xr.Dataset], title: str) -> Table:
     sweeps: frontiers, of which the stiffest ground that all of them have is told. Raises InputError if there is none.
     """
     stiffness = _common_stiffness(list(sweeps.values()))
+    _refuse_strangers(sweeps)
     first = next(iter(sweeps.values()))
     scene = scenes.from_mapping(json.loads(first.attrs["scene"])).with_ground(stiffness=stiffness)
 
     def omega_h(steps: float) -> float:
         return theory.omega_h(scene, steps)
 
-    laws = [meanings_of(first.contact)[k] for k in first.contact.values]
+    laws = list(dict.fromkeys(meanings_of(found.contact)[k] for found in sweeps.values() for k in found.contact.values))
     criteria = list(dict.fromkeys(name for found in sweeps.values() for name in meanings_of(found.criterion)))
     scans = {
         (criterion, law): _scan(list(sweeps.values()), stiffness, criterion, law)
@@ -57,10 +58,11 @@ def table(sweeps: Mapping[str, xr.Dataset], title: str) -> Table:
         for question, answer in _questions(omega_h).items()
         for criterion in criteria
     ]
-    ends = min(scan.steps[0] for scan in scans.values()), max(scan.steps[-1] for scan in scans.values())
+    scanned = np.concatenate([scan.steps for scan in scans.values()])
     note = (
         f"S = {stiffness:g} kg/s². Near a number of steps: all members of all scanned cells within {NEAR:.1%} of it. "
-        f"Members are spread over the phase of the touch-down. Scanned: {ends[0]:,} to {ends[1]:,} steps."
+        f"Members are spread over the phase of the touch-down. Scanned: {scanned.min():,} to {scanned.max():,} steps; "
+        "between sweeps there may be holes."
     )
     return rendered(title, ["question", "criterion", *laws], rows, note)
 
@@ -76,7 +78,7 @@ def _questions(omega_h: Callable[[float], float]) -> dict[str, Callable[[Scan], 
         "fewest steps at which every member passes": partial(_edge, "first_pass", omega_h),
         "most steps at which a member fails": partial(_edge, "last_fail", omega_h),
         "steps from which on every member passes": partial(_edge, "steps_needed", omega_h),
-        "changes between pass and fail along the scan": lambda scan: f"{_edges(scan)['flips']:.0f}",
+        "changes between pass and fail along the scan": _flips,
     }
 
 
@@ -88,7 +90,10 @@ def _passing(choice: int, scan: Scan) -> str:
 def _window(scan: Scan) -> str:
     """Return the span around the paper's second choice in which no scanned cell has a member that fails."""
     good = scan.shares == 1
-    middle = int(np.argmin(np.abs(scan.steps - CHOICES[1])))
+    away = np.abs(scan.steps / CHOICES[1] - 1)
+    if not away.size or away.min() > NEAR:
+        return "not scanned"
+    middle = int(np.argmin(away))
     if not good[middle]:
         return "none"
     bad = np.flatnonzero(~good)
@@ -99,12 +104,35 @@ def _window(scan: Scan) -> str:
 
 
 def _edge(name: str, omega_h: Callable[[float], float], scan: Scan) -> str:
+    if not scan.steps.size:
+        return "not scanned"
     steps = _edges(scan)[name]
+    if name != "last_fail" and (scan.shares == 1).all():
+        return f"{scan.steps[0]:,} or fewer"
+    if name == "last_fail" and scan.shares[-1] < 1:
+        return f"{scan.steps[-1]:,} or more"
     return "none" if math.isnan(steps) else f"{steps:,.0f} (ωh = {omega_h(steps):.3g})"
 
 
+def _flips(scan: Scan) -> str:
+    return f"{_edges(scan)['flips']:.0f}" if scan.steps.size else "not scanned"
+
+
 def _edges(scan: Scan) -> dict[str, float]:
+    """Return the edges of a scan with cells."""
     return edges(scan.steps, scan.shares == 1)
+
+
+def _refuse_strangers(sweeps: Mapping[str, xr.Dataset]) -> None:
+    """Raise InputError unless all sweeps are of one scene and model, and ask a criterion at one tolerance."""
+    asked: dict[str, float] = {}
+    for name, found in sweeps.items():
+        for key in ("scene_digest", "model", "scheme"):
+            if found.attrs[key] != next(iter(sweeps.values())).attrs[key]:
+                raise InputError(f"answers: sweep {name} has another {key.partition('_')[0]} than the first")
+        for criterion, tolerance in zip(meanings_of(found.criterion), found.tolerance.values, strict=True):
+            if asked.setdefault(criterion, float(tolerance)) != float(tolerance):
+                raise InputError(f"answers: sweep {name} asks {criterion} at another tolerance than the first")
 
 
 def _common_stiffness(sweeps: Sequence[xr.Dataset]) -> float:
@@ -116,7 +144,7 @@ def _common_stiffness(sweeps: Sequence[xr.Dataset]) -> float:
 
 def _scan(sweeps: Sequence[xr.Dataset], stiffness: float, criterion: str, law: str) -> Scan:
     """Return the cells of all sweeps at one stiffness as one scan."""
-    steps, shares = [], []
+    steps, shares = [np.zeros(0, np.int64)], [np.zeros(0)]
     for found in sweeps:
         names = meanings_of(found.criterion)
         if criterion in names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
     return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
 
 
+SHOWN = 10  # bounces of a ledger
+
 # Of a run's ledger, in this order.
 _BOOKED = ("launch_energy", "damping_work", "drag_work", "friction_work", "scheme_work", "end_energy")
 
@@ -56,7 +59,13 @@ _BOOKED = ("launch_energy", "damping_work", "drag_work", "friction_work", "schem
 def _ledger(dataset: xr.Dataset) -> list[str]:
     """Return where the energy of a run went, a line each."""
     lines = [f"  {name:14} {float(dataset[name]):+12.6g} J" for name in _BOOKED]
-    return [*lines, f"  in {int(dataset.bounce_count)} bounces and the flights between them"]
+    lines.append(f"  in {int(dataset.bounce_count)} bounces and the flights between them; the first of them:")
+    parts = ("damping_work", "drag_work", "friction_work", "scheme_work")
+    lines.append(f"  {'start [s]':>16}" + "".join(f"{part + ' [J]':>18}" for part in parts))
+    for k in range(min(SHOWN, dataset.sizes["bounce"])):
+        works = [float(dataset[f"bounce_{part}"][k]) for part in parts]
+        lines.append(f"  {float(dataset.bounce_start[k]):16.6g}" + "".join(f"{work:+18.6g}" for work in works))
+    return lines
 
 
 def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
@@ -78,6 +87,12 @@ def _variables(dataset: xr.Dataset) -> list[str]:
     ]
 
 
+def _number(variable: xr.DataArray) -> float | None:
+    """Return a single value; none where it is not a number that JSON has."""
+    value = float(variable)
+    return value if math.isfinite(value) else None
+
+
 def as_json(dataset: xr.Dataset) -> str:
     """Return the same as JSON: attributes, sizes, verdicts and variables."""
     attributes = {key: _plain(value) for key, value in dataset.attrs.items()}
@@ -86,6 +101,7 @@ def as_json(dataset: xr.Dataset) -> str:
     content = {
         "attributes": attributes,
         "sizes": {str(name): size for name, size in dataset.sizes.items()},
+        "values": {str(name): _number(variable) for name, variable in dataset.data_vars.items() if variable.ndim == 0},
         "verdicts": _verdict_counts(dataset) if "verdict" in dataset else {},
         "variables": {
             str(name): {"dimensions": list(variable.dims), "units": variable.attrs.get("units")}

@@ -6,6 +6,7 @@ from job import Stopwatch, logged
 
 from stiffdice import scene as scenes
 from stiffdice.catalogue import EXPERIMENTS
+from stiffdice.errors import InputError
 from stiffdice.io.write import write_dataset
 
 snakemake: Any  # Snakemake puts it here
@@ -15,6 +16,10 @@ with logged(snakemake.log[0]) as say:
     scene = scenes.load(planned.scene, planned.changes)
     watch = Stopwatch()
     with watch.running():
-        found = EXPERIMENTS[planned.measure].load()(scene, **planned.options)
+        try:
+            found = EXPERIMENTS[planned.measure].load()(scene, **planned.options)
+        except InputError as error:
+            where = f"config/{snakemake.wildcards.study}.yaml: experiments.{snakemake.wildcards.experiment}.options"
+            raise error.within(where) from None
     write_dataset(found, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

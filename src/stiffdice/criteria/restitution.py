@@ -42,6 +42,6 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
         if depth < free and not math.isnan(slots[0]):
             out = exact.rebound_speed(law, physics, sight.pull, sight.speed_in)
             slots[0] = max(slots[0], abs(sight.speed_out - out) / sight.speed_in)
-        elif free == 0.0:
+        else:
             slots[0] = math.nan
     return slots[0], sight.held > 0.0

@@ -30,7 +30,13 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         color, marker = _LOOKS[k % len(_LOOKS)]
         least = float(dataset.least_step[k])
         rests = swings[k] < lowest
-        common: Any = {"linestyle": "none", "marker": marker, "color": color, "markersize": 8 - 2 * k, "zorder": 3}
+        common: Any = {
+            "linestyle": "none",
+            "marker": marker,
+            "color": color,
+            "markersize": max(3, 8 - 2 * k),
+            "zorder": 3,
+        }
         panel.plot(sizes[~rests], swings[k, ~rests], label=f"μ = {captions.readable(float(mu))}", **common)
         panel.plot(sizes[rests], np.full(rests.sum(), lowest), markerfacecolor="none", clip_on=False, **common)
         if least < sizes.max():

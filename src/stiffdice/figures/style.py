@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -104,7 +105,8 @@ def new_figure(title: str, width: float = 7.2, height: float = 4.4) -> Figure:
 
 
 def add_note(figure: Figure, text: str) -> None:
-    """Write one quiet line under a figure: what was run."""
+    """Write a quiet line under a figure, in as many as it takes: what was run."""
+    text = textwrap.fill(text, width=int(15 * figure.get_figwidth()))
     figure.supxlabel(text, x=0.01, ha="left", fontsize=7.5, color=QUIET)
 
 
