@@ -43,9 +43,11 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     top = np.nanmax([np.abs(books[name].values) for name in ("friction_work", "damping_work", "scheme_work")])
     panels[0].set_ylim(SMALLEST, 3 * top)
     panels[-1].set_xlim(-0.5, len(labels) - 0.5)
-    panels[-1].set_xlabel("number of time steps [1], and ωh; in each group the first bounces from left to right")
+    panels[-1].set_xlabel(
+        "number of time steps [1], and ωh; in each group the first bounces from left to right; "
+        f"below {SMALLEST:g} J not shown"
+    )
     figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
-    style.add_note(figure, f"works below {SMALLEST:g} J are not shown")
     return figure
 
 
