@@ -162,3 +162,9 @@ def test_the_largest_gain_comes_to_the_bound_half_way_between_magic_steps_and_to
     for omega_h in np.linspace(0.01, 1.999, 500):
         assert 1 - 1e-12 <= theory.largest_gain(omega_h) <= theory.gain_bound(omega_h) * (1 + 1e-12)
     assert theory.largest_gain(2 - 1e-9) == pytest.approx(9, rel=1e-6)
+
+
+def test_a_cube_at_rest_is_held_by_four_springs():
+    scene = Scene().with_ground(stiffness=50)
+    assert 4 * 50 * theory.sag(scene) == pytest.approx(scene.cube.mass * scene.gravity, rel=1e-15)
+    assert theory.sag(Scene().with_ground(stiffness=0)) == np.inf

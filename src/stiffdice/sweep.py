@@ -146,7 +146,11 @@ def _pattern(sweep: Sweep) -> xr.Dataset:
         name: ("cell", value, layout.CELL_ATTRIBUTES[name]) for name, value in _cell_values(sweep, column, [1]).items()
     } | {
         "member": ("member", member, layout.MEMBER_ATTRIBUTES),
-        "criterion": ("criterion", np.arange(len(criteria.CRITERIA), dtype=np.int8), layout.CRITERION_ATTRIBUTES),
+        "criterion": (
+            "criterion",
+            np.arange(len(criteria.CRITERIA), dtype=np.int8),
+            layout.criterion_attributes(list(criteria.CRITERIA)),
+        ),
     }
     attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
     return xr.Dataset(runs, coordinates, attributes)

@@ -23,6 +23,12 @@ def contact_frequency(stiffness: float, mass: float, nodes: int = BOUNCE_NODES) 
     return math.sqrt(nodes) * math.sqrt(stiffness) / math.sqrt(mass)
 
 
+def sag(scene: Scene) -> float:
+    """Return how deep a cube at rest on its face sinks in [m]: m g/(4S); infinite without springs."""
+    springs = BOUNCE_NODES * scene.ground.stiffness
+    return scene.cube.mass * scene.gravity / springs if springs > 0 else math.inf
+
+
 def omega_h(scene: Scene, steps: float) -> float:
     """Return ωh [1] of a flat landing in this scene: contact frequency times step size."""
     return contact_frequency(scene.ground.stiffness, scene.cube.mass) * (scene.duration / steps)

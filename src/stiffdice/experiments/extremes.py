@@ -69,15 +69,9 @@ def _still(scene: Scene, clearance: float) -> Scene:
     return _at_clearance(dataclasses.replace(scene, launch=still), clearance)
 
 
-def _sag(scene: Scene) -> float:
-    """Return how deep the cube sinks in at rest on four nodes [m], at most its side."""
-    weight, springs = scene.cube.mass * scene.gravity, theory.BOUNCE_NODES * scene.ground.stiffness
-    return weight / springs if weight < springs * scene.cube.side else scene.cube.side
-
-
 STARTS: Mapping[str, Callable[[Scene], Scene]] = {
     "launch": lambda scene: scene,
-    "at_rest": lambda scene: _still(scene, -_sag(scene)),
+    "at_rest": lambda scene: _still(scene, -min(theory.sag(scene), scene.cube.side)),
     "touching": lambda scene: _still(scene, 0.0),
     "deep": lambda scene: _still(scene, -scene.cube.side / 2),
     "far_below": lambda scene: _still(scene, -3 * scene.cube.side),

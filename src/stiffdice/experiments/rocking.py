@@ -112,17 +112,12 @@ def _on_level_ground(scene: Scene, inertia: str) -> Scene:
     level = scene.with_ground(normal=(0.0, 0.0, 1.0), friction=0.0, damping=0.0, contact="gated")
     stiffness = scene.ground.stiffness
     lowest, highest = (part * cube.side for part in _SAGS)
-    if not lowest <= (_sag(scene) if stiffness > 0 else np.inf) <= highest:
+    if not lowest <= theory.sag(scene) <= highest:
         raise InputError(
             f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by m g/(4 S); "
             f"allowed is {lowest:.3g} to {highest:.3g} [m]"
         )
     return dataclasses.replace(level, cube=cube)
-
-
-def _sag(scene: Scene) -> float:
-    """Return how deep the lower face lies at rest [m]."""
-    return scene.cube.mass * scene.gravity / (theory.BOUNCE_NODES * scene.ground.stiffness)
 
 
 class _Contact(NamedTuple):
@@ -249,7 +244,7 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     zeta, relative: damping ratio, and ωh in units of its limit, of the nudged motion. A cube that is tipped at rest is
     toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I.
     """
-    half, sag = scene.cube.side / 2, _sag(scene)
+    half, sag = scene.cube.side / 2, theory.sag(scene)
     tips = abs(mode.shape[0]) < 0.5
     toppling = scene.cube.mass * scene.gravity * half / scene.cube.moment_of_inertia if tips else 0.0
     omega = np.sqrt(mode.predicted - toppling)

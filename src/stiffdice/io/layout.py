@@ -26,8 +26,6 @@ VERDICT_ATTRIBUTES = enum_attributes("verdict", [verdict.name.lower() for verdic
 AXIS_ATTRIBUTES = enum_attributes("Cartesian axis, z up", ["x", "y", "z"])
 
 
-CRITERION_ATTRIBUTES = enum_attributes("criterion", list(CRITERIA))
-
 # By the measure's name; those of steps that are counted.
 MEASURE_ATTRIBUTES = {
     criterion.MEASURE: {"long_name": criterion.LONG_NAME, "units": "1"} for criterion in CRITERIA.values()
