@@ -231,3 +231,19 @@ def test_every_scene_ends_with_a_verdict(model, contact, stiffness, damping, fri
     assert Verdict(run.verdict[0]) in Verdict
     assert (run.steps_done[0] < steps) == (Verdict(run.verdict[0]) == Verdict.LEFT_NUMERIC_RANGE)
     assert np.isfinite(run.trajectory.state["position"]).all()
+
+
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+def test_leaping_between_samples_keeps_the_same_states_to_round_off(model):
+    scene = from_mapping({"ground": {"stiffness": 1e6, "contact": "gated"}, "duration": 1.5})
+    stepped, leapt = (simulate(scene, model=model, steps=30_000, every=1000, leap=leap) for leap in (False, True))
+    assert leapt.steps_computed[0] < 0.2 * stepped.steps_computed[0] == 0.2 * 30_000
+    assert leapt.evaluations[0] == leapt.steps_computed[0]
+    for name in ("position", "velocity"):
+        np.testing.assert_allclose(leapt.trajectory.state[name], stepped.trajectory.state[name], atol=1e-10)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-14, 1.0, float("nan"), "small"])
+def test_a_tolerance_out_of_range_is_refused(tolerance):
+    with pytest.raises(InputError, match="tolerance"):
+        simulate(from_mapping({}), steps=1, tolerance=tolerance)

@@ -73,6 +73,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
     run.add_argument(
+        "--tolerance",
+        metavar="X",
+        help="of the error, for a scheme that controls its own (default: 1e-9 of the motion)",
+    )
+    run.add_argument(
         "--every",
         metavar="K",
         help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
@@ -121,6 +126,14 @@ def _whole(option: str, text: str) -> int:
         raise InputError(f"{option} = {text}: allowed is a whole number from 1 to {checks.LARGEST_COUNT}") from None
 
 
+def _number(option: str, text: str) -> float:
+    """Return the number in an option's text."""
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option} = {text}: allowed is a number") from None
+
+
 def _run(options: argparse.Namespace) -> None:
     from stiffdice import scene as scenes
     from stiffdice.io.write import check_target
@@ -132,7 +145,7 @@ def _run(options: argparse.Namespace) -> None:
         raise InputError(f"{target}: is the scene itself; name another file for the output")
 
     # These take about a second to import; bad input is told before.
-    from stiffdice import ledger
+    from stiffdice import ledger, schemes
     from stiffdice.io.layout import run_dataset
     from stiffdice.io.write import write_dataset
     from stiffdice.progress import Progress
@@ -140,12 +153,14 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.verdict import Verdict
 
     every = default_every(steps) if options.every is None else _whole("--every", options.every)
+    tolerance = schemes.TOLERANCE if options.tolerance is None else _number("--tolerance", options.tolerance)
     with Progress() as progress:
         run = simulate(
             scene,
             model=options.model,
             scheme=options.scheme,
             steps=steps,
+            tolerance=tolerance,
             every=every,
             progress=progress.show,
         )

@@ -230,7 +230,7 @@ def _keep(
     row = rows[0]
     for i in range(1, steps + 1):
         before, after = views[(i - 1) % 2], views[i % 2]
-        schemes.step(scheme, model, law, physics, state, h)
+        schemes.step(scheme, model, law, physics, state, h, schemes.TOLERANCE)
         _look(law, physics, weightless, state, late, after)
         _book(booked, physics, before, after, lag, h)
         if not _size(booked) < LARGEST_WORK:

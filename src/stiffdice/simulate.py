@@ -60,20 +60,23 @@ class Run:
     tolerances: of the criteria the run was asked. measures: values by name, shape (member,). steps_done: int64
     (member,): fewer than `steps` where the run was stopped, all being decided, or left the range of doubles.
     decided: int64 (member, criterion), the step that decided a criterion, in the registry's order; 0 if none did before
-    the end. steps_computed: int64 (member,), those not taken at once. verdict: int8 (member,), a `Verdict`.
-    end: the last state, shape (member, ...).
+    the end. steps_computed: int64 (member,), those not taken at once. evaluations: int64 (member,), of the force.
+    tolerance [1]: of the error, for a scheme that controls its own. verdict: int8 (member,), a `Verdict`. end: the last
+    state, shape (member, ...).
     """
 
     scene: Scene
     model: str
     scheme: str
     steps: int
+    tolerance: float
     tolerances: dict[str, float]
     measures: dict[str, Array]
     touchdown_phase: Array
     steps_done: npt.NDArray[np.int64]
     decided: npt.NDArray[np.int64]
     steps_computed: npt.NDArray[np.int64]
+    evaluations: npt.NDArray[np.int64]
     verdict: npt.NDArray[np.int8]
     end: States
     trajectory: Trajectory | None
@@ -90,7 +93,9 @@ def simulate(
     model: str = "tumbling",
     scheme: str = "symplectic_euler",
     steps: int = 10_000,
+    tolerance: float = schemes.TOLERANCE,
     every: int | None = None,
+    leap: bool = False,
     members: Ensemble | None = None,
     criteria: Mapping[str, float] | None = None,
     stop: Mapping[str, float] | None = None,
@@ -100,18 +105,25 @@ def simulate(
 ) -> Run:
     """Run the simulator and return what happened.
 
-    every: keep every K-th state, from the launch on; None keeps none, and takes many steps at once where their motion
-    is known (`flight.py`, `phases.py`), which agrees with stepping to round-off. members: the launches of an ensemble;
-    None runs the scene's own launch. criteria: tolerances of those that the verdict asks; None asks the default ones.
-    stop: end a run as soon as all of these criteria are decided at these tolerances. references: what `trajectory`
-    compares with, one for all or one for each member (`reference.make`). budget: most steps to compute one by one; a
-    run that needs more ends undecided. progress: called with the fraction done, some times a second.
+    tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are then the
+    intervals after which a state is known. every: keep every K-th state, from the launch on. leap: take many steps at
+    once where their motion is known (`flight.py`, `phases.py`), which agrees with stepping to round-off; where no state
+    is kept that is done anyway. members: the launches of an ensemble; None runs the scene's own launch. criteria:
+    tolerances of those that the verdict asks; None asks the default ones. stop: end a run as soon as all of these
+    criteria are decided at these tolerances. references: what `trajectory` compares with, one for all or one for each
+    member (`reference.make`). budget: most steps to compute one by one; a run that needs more ends undecided. progress:
+    called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, and a trajectory too large to hold.
     """
     checks.choice("model", model, MODELS)
     checks.choice("scheme", scheme, schemes.SCHEMES)
     steps = checks.count("steps", steps)
+    tolerance = checks.number("tolerance", tolerance, "1", above=0)
+    if not schemes.FINEST <= tolerance <= schemes.COARSEST:
+        raise InputError(
+            f"tolerance = {tolerance:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}"
+        )
     tolerances = tolerances_of(model, criteria)
     alone = Ensemble(start_of(scene, model), np.zeros(1))
     launches, late = alone if members is None else members
@@ -126,7 +138,7 @@ def simulate(
     tags = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
     h = scene.duration / steps
     most = steps if budget is None else budget
-    watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((2, count), np.int64))
+    watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64))
     watched.memory["limits"] = limits_of({} if stop is None else stop)
     if every is not None:
         samples[0] = ensemble[0]
@@ -144,12 +156,15 @@ def simulate(
             watched.sight,
             watched.steps_done,
             watched.steps_computed,
+            watched.evaluations,
             none() if references is None else references,
             reached,
             steps,
             h,
+            tolerance,
             most,
             every or 0,
+            leap or every is None,
             samples,
         )
         if progress is not None:
@@ -167,12 +182,14 @@ def simulate(
         model,
         scheme,
         steps,
+        tolerance,
         tolerances,
         found,
         watched.sight["touchdown_phase"].copy(),
         watched.steps_done,
         watched.memory["decided"].copy(),
         watched.steps_computed,
+        watched.evaluations,
         judge(tolerances, found, endings),
         ensemble,
         None if every is None else _trajectory(scene, physics, samples, every, steps, int(watched.steps_done[0])),
@@ -186,6 +203,7 @@ class Watched(NamedTuple):
     sight: npt.NDArray[np.void]
     steps_done: npt.NDArray[np.int64]
     steps_computed: npt.NDArray[np.int64]
+    evaluations: npt.NDArray[np.int64]
 
 
 def _room_for(steps: int, every: int | None) -> States:
@@ -227,29 +245,32 @@ def _march(
     sight: npt.NDArray[np.void],
     steps_done: npt.NDArray[np.int64],
     steps_computed: npt.NDArray[np.int64],
+    evaluations: npt.NDArray[np.int64],
     references: npt.NDArray[np.void],
     stop: int,
     steps: int,
     h: float,
+    tolerance: float,
     budget: int,
     every: int,
+    leap: bool,
     samples: States,
 ) -> None:
     """Advance every member to step `stop`, watching each step and keeping every K-th.
 
-    Between samples nothing is skipped; without samples, motion that is known is taken at once, past `stop` if it lasts
-    longer, so that where to stop changes nothing.
+    leap: motion that is known is taken at once, up to the next sample; past `stop` if it lasts longer, so that where to
+    stop changes nothing.
     """
     for m in range(ensemble.shape[0]):
         state, seen, remembered = ensemble[m], sight[m], memory[m]
         reference = references[m % references.shape[0]]
         undecided = open_of(remembered)
         done = steps_done[m]
-        until_kept = every - done % every if every > 0 else -1
+        kept = (done // every + 1) * every if every > 0 else -1  # the step to keep next
         while done < stop and undecided > 0 and remembered.finite[0] == 0.0:
             flown = skipped = 0
-            if every == 0:
-                most = steps - done
+            if leap:
+                most = min(kept, steps) - done if every > 0 else steps - done
                 if reference.horizon >= seen.time:  # it is compared at least as often as the reference is known
                     most = min(most, 1 + int(reference.spacing / h))
                 flown = free_steps(model, law, physics, state, seen, most)
@@ -260,7 +281,7 @@ def _march(
             elif steps_computed[m] >= budget:
                 break
             else:
-                schemes.step(scheme, model, law, physics, state, h)
+                evaluations[m] += schemes.step(scheme, model, law, physics, state, h, tolerance)
                 steps_computed[m] += 1
             step = done + skipped + max(1, flown)
             watch.observe(seen, physics, state, step, flown)
@@ -268,10 +289,9 @@ def _march(
             if remembered.finite[0] > 0.0:
                 break
             done = step
-            until_kept -= 1
-            if until_kept == 0:
-                until_kept = every
+            if done == kept:
                 samples[step // every] = state
+                kept += every
         steps_done[m] = done
 
 

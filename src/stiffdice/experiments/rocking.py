@@ -195,7 +195,7 @@ def _jacobian(contact: _Contact, damping: float, h: float) -> Array:
 def _step_each(scheme: Any, model: Any, law: Any, physics: Physics, states: States, h: float) -> None:
     """Advance each state by one step of h [s]."""
     for k in range(states.shape[0]):
-        schemes.step(scheme, model, law, physics, states[k], h)
+        schemes.step(scheme, model, law, physics, states[k], h, schemes.TOLERANCE)
 
 
 def _mode(scene: Scene, name: str) -> _Mode:

@@ -33,6 +33,7 @@ MEASURE_ATTRIBUTES = {
 PHASE_ATTRIBUTES = {"long_name": "phase of the first touch-down within its time step", "units": "1"}
 STEPS_DONE_ATTRIBUTES = {"long_name": "steps done when the run ended", "units": "1"}
 STEPS_COMPUTED_ATTRIBUTES = {"long_name": "steps computed one by one, not many at once", "units": "1"}
+EVALUATIONS_ATTRIBUTES = {"long_name": "evaluations of the force", "units": "1"}
 DECIDED_ATTRIBUTES = {"long_name": "step that decided the criterion, 0 if none before the end", "units": "1"}
 MEMBER_ATTRIBUTES = {"long_name": "member: number k of n is launched k/n of a time step late", "units": "1"}
 CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
@@ -108,10 +109,12 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     variables["touchdown_phase"] = ((), run.touchdown_phase[0], PHASE_ATTRIBUTES)
     variables["verdict"] = ((), run.verdict[0], VERDICT_ATTRIBUTES)
     variables["steps_done"] = ((), run.steps_done[0], STEPS_DONE_ATTRIBUTES)
+    variables["evaluations"] = ((), run.evaluations[0], EVALUATIONS_ATTRIBUTES)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, "stiffdice.simulate") | {
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,
         "step_size_units": "s",
+        "tolerance": run.tolerance,
         "omega_h": theory.omega_h(run.scene, run.steps),
         "angular_momentum_at_launch": np.array(run.scene.launch.spin),
         "criteria": criteria_text(run.tolerances),

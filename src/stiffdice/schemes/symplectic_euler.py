@@ -26,11 +26,12 @@ LAG = 0.5
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float) -> None:
-    """Advance `state` by one step of h [s]."""
+def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+    """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     wrench = models.force(model, law, physics, state)
     models.kick(model, physics, state, wrench, h)
     models.drift(model, physics, state, h)
+    return 1
 
 
 @njit
