@@ -135,6 +135,7 @@ def _number(option: str, text: str) -> float:
 
 
 def _run(options: argparse.Namespace) -> None:
+    from stiffdice import checks
     from stiffdice import scene as scenes
     from stiffdice.io.write import check_target
 
@@ -152,6 +153,8 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.simulate import default_every, simulate
     from stiffdice.verdict import Verdict
 
+    if options.ledger:
+        checks.choice("--ledger: scheme", options.scheme, ledger.BOOKED)
     every = default_every(steps) if options.every is None else _whole("--every", options.every)
     tolerance = schemes.TOLERANCE if options.tolerance is None else _number("--tolerance", options.tolerance)
     with Progress() as progress:

@@ -34,6 +34,9 @@ from stiffdice.models import MODELS
 from stiffdice.scene import Scene
 from stiffdice.state import Array, Physics, States, physics_of, start_of
 
+# Schemes whose every step has a force to book.
+BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
+
 LARGEST = 10_000  # bounces whose rows are kept
 
 # A step that books more [J] ends the ledger, so that all sums of what is booked stay within doubles.
@@ -162,7 +165,7 @@ def keep(
     Raises InputError for an unknown name or a step count out of range.
     """
     checks.choice("model", model, MODELS)
-    checks.choice("scheme", scheme, schemes.SCHEMES)
+    checks.choice("scheme", scheme, BOOKED)
     steps = checks.count("steps", steps)
     physics = physics_of(scene)
     accounts = np.zeros(3, _ACCOUNT)

@@ -144,7 +144,8 @@ def simulate(
         samples[0] = ensemble[0]
     _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, schemes.LAGS[scheme])
 
-    reached, chunk = 0, steps if progress is None else 20_000
+    reached, first = 0, 100 if scheme in schemes.OWN_STEPS else 20_000
+    chunk = steps if progress is None else first
     while reached < steps:
         begun = time.perf_counter()
         reached = min(steps, reached + chunk)

@@ -10,7 +10,8 @@ from stiffdice.scene import from_mapping
 from stiffdice.schemes import SCHEMES
 from stiffdice.simulate import simulate
 
-ORDER = {"symplectic_euler": 1}
+# None: the error is set by a tolerance, and tested where the scheme is.
+ORDER = {"symplectic_euler": 1, "event": None}
 
 
 def at_rest(stiffness=100.0, damping=0.0, lift=0.0, duration=2.0):
@@ -29,7 +30,7 @@ def test_every_scheme_has_its_order_stated():
     assert set(ORDER) == set(SCHEMES)
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", [name for name, order in ORDER.items() if order])
 def test_order_of_convergence_on_a_smooth_problem(scheme):
     lift, scene = 0.01, at_rest(damping=1.0, lift=0.01)
     beta = 4 * scene.ground.damping / 2

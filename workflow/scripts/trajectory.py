@@ -18,7 +18,9 @@ with logged(snakemake.log[0]) as say:
     watch = Stopwatch()
     with watch.running():
         run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps, every=planned.every)
-        books = ledger.keep(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps)
-    dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
-    write_dataset(dataset.assign(ledger.variables(books)), snakemake.output[0])
+        dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
+        if planned.scheme in ledger.BOOKED:
+            books = ledger.keep(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps)
+            dataset = dataset.assign(ledger.variables(books))
+    write_dataset(dataset, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

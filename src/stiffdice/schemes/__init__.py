@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from stiffdice.compiled import by_tag
-from stiffdice.schemes import symplectic_euler
+from stiffdice.schemes import event, symplectic_euler
 
 _MODULES: dict[str, Any] = {
     "symplectic_euler": symplectic_euler,
+    "event": event,
 }
 
 SCHEMES = {name: module.TAG for name, module in _MODULES.items()}
@@ -27,6 +28,9 @@ swing = by_tag({type(module.TAG): module.swing for module in _MODULES.values()})
 # What a scheme that controls its own error aims at, relative to the motion, unless told otherwise.
 TOLERANCE = 1e-9
 FINEST, COARSEST = 1e-13, 0.1
+
+# Schemes that take steps of their own between two states: what happens in one of ours, they do not tell.
+OWN_STEPS = frozenset(name for name, module in _MODULES.items() if getattr(module, "OWN_STEPS", False))
 
 # By how many steps a scheme's velocity is behind its place: in free flight the path's slope is u + LAG·(u − u_before).
 LAGS: dict[str, float] = {name: module.LAG for name, module in _MODULES.items()}

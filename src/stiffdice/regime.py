@@ -1,0 +1,407 @@
+"""The motion between two events: as long as the same nodes touch and are pushed, its equations are smooth.
+
+A regime says of each node whether it is below the ground and whether the ground's force on it is positive. In a regime
+the forces are taken as these two answers say, past the event that ends it, too, so that no step of an integrator ever
+meets a jump or a kink. Events are the zeros of the switches, two for each node: its depth, and the force that the
+contact law would give it, S d − D u, before the law cuts it off at zero.
+
+The motion is a vector: position [m], velocity [m/s], angular momentum [kg m²/s], and the quaternion (scalar first) that
+turned the nodes since the vector was made. A body that does not turn has only the first six.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stiffdice.compiled import by_tag, njit
+from stiffdice.contact import Gated, Ungated
+from stiffdice.state import Physics
+
+SIZE = 13
+SIZE_WITHOUT_SPIN = 6
+
+# What a regime says of a node, as bits.
+BELOW = 1
+PUSHED = 2
+
+NODES = 8
+SWITCHES = 2 * NODES  # depth and force of node k are 2k and 2k + 1
+
+# Units in the last place of the height, and of a speed, within which a switch is taken for zero.
+_ULPS = 8 * 2.0**-52
+
+
+@njit
+def _dragged() -> bool:
+    return True
+
+
+@njit
+def _left_alone() -> bool:
+    return False
+
+
+# (law) -> whether the ground pushes a node above it, too, if it falls.
+drags = by_tag({Ungated: _dragged, Gated: _left_alone})
+
+
+@njit
+def _turned(motion: Any, nodes: Any, k: int) -> tuple[float, float, float]:
+    """Return node k relative to the centre [m], turned by the motion's quaternion, of whatever norm."""
+    w, x, y, z = motion[9], motion[10], motion[11], motion[12]
+    a, b, c = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+    twice = 2.0 / (w * w + x * x + y * y + z * z)
+    p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a + twice * (w * p + y * r - z * q),
+        b + twice * (w * q + z * p - x * r),
+        c + twice * (w * r + x * q - y * p),
+    )
+
+
+@njit
+def _node(
+    turning: bool, physics: Physics, nodes: Any, motion: Any, k: int
+) -> tuple[float, float, float, float, float, float]:
+    """Return place relative to the centre [m] and velocity [m/s] of node k."""
+    if not turning:
+        return nodes[k, 0], nodes[k, 1], nodes[k, 2], motion[3], motion[4], motion[5]
+    rx, ry, rz = _turned(motion, nodes, k)
+    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
+    return (
+        rx,
+        ry,
+        rz,
+        motion[3] + (wy * rz - wz * ry),
+        motion[4] + (wz * rx - wx * rz),
+        motion[5] + (wx * ry - wy * rx),
+    )
+
+
+@njit
+def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, rate: Any) -> None:
+    """Set `rate` to the motion's time derivative in a regime (equations 3 to 5, 8, 10; q' = ω q/2).
+
+    nodes [m]: shape (8, 3), before they are turned. regime: bits of each node, shape (8,).
+    """
+    fx = fy = fz = tx = ty = tz = 0.0
+    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    for k in range(NODES):
+        if regime[k] & PUSHED == 0:
+            continue
+        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        push = -physics.damping * speed
+        if regime[k] & BELOW:
+            push -= physics.stiffness * (height + physics.nx * rx + physics.ny * ry + physics.nz * rz)
+        sx, sy, sz = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
+        grip = physics.friction * push / (math.sqrt(sx * sx + sy * sy + sz * sz) + physics.cutoff)
+        gx = push * physics.nx - grip * sx
+        gy = push * physics.ny - grip * sy
+        gz = push * physics.nz - grip * sz
+        fx += gx
+        fy += gy
+        fz += gz
+        tx += ry * gz - rz * gy
+        ty += rz * gx - rx * gz
+        tz += rx * gy - ry * gx
+    rate[0], rate[1], rate[2] = motion[3], motion[4], motion[5]
+    rate[3] = fx / physics.mass
+    rate[4] = fy / physics.mass
+    rate[5] = (fz - physics.weight) / physics.mass
+    if turning:
+        rate[6], rate[7], rate[8] = tx, ty, tz
+        x, y, z = motion[6] / physics.inertia / 2, motion[7] / physics.inertia / 2, motion[8] / physics.inertia / 2
+        a, b, c, d = motion[9], motion[10], motion[11], motion[12]
+        rate[9] = -x * b - y * c - z * d
+        rate[10] = x * a + y * d - z * c
+        rate[11] = y * a + z * b - x * d
+        rate[12] = z * a + x * c - y * b
+
+
+@njit
+def switches(
+    turning: bool,
+    dragging: bool,
+    physics: Physics,
+    nodes: Any,
+    regime: Any,
+    motion: Any,
+    rate: Any,
+    value: Any,
+    slope: Any,
+) -> None:
+    """Set values and time derivatives of the switches, shape (16,): positive as long as the regime lasts.
+
+    Depths in m; forces in N. A switch that nothing hangs on is 1 for ever.
+    """
+    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    ax, ay, az = rate[3], rate[4], rate[5]
+    for k in range(NODES):
+        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
+        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        below = regime[k] & BELOW != 0
+        value[2 * k], slope[2 * k] = (-clearance, -speed) if below else (clearance, speed)
+        value[2 * k + 1], slope[2 * k + 1] = 1.0, 0.0
+        if physics.damping == 0.0 or not (below or dragging):
+            continue
+        gain = physics.nx * ax + physics.ny * ay + physics.nz * az
+        if turning:
+            gain += _turning_gain(physics, motion, rate, rx, ry, rz)
+        push, change = -physics.damping * speed, -physics.damping * gain
+        if below:
+            push -= physics.stiffness * clearance
+            change -= physics.stiffness * speed
+        pushed = regime[k] & PUSHED != 0
+        value[2 * k + 1], slope[2 * k + 1] = (push, change) if pushed else (-push, -change)
+
+
+@njit
+def _turning_gain(physics: Physics, motion: Any, rate: Any, rx: float, ry: float, rz: float) -> float:
+    """Return a node's acceleration along the normal by turning [m/s²]: n·(α × r + ω × (ω × r))."""
+    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
+    bx, by, bz = rate[6] / physics.inertia, rate[7] / physics.inertia, rate[8] / physics.inertia
+    cx, cy, cz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
+    return float(
+        physics.nx * (by * rz - bz * ry + wy * cz - wz * cy)
+        + physics.ny * (bz * rx - bx * rz + wz * cx - wx * cz)
+        + physics.nz * (bx * ry - by * rx + wx * cy - wy * cx)
+    )
+
+
+@njit
+def vanishing(physics: Physics, motion: Any, small: Any) -> None:
+    """Set below which size a depth [m] and a force [N] are zero but for round-off, shape (2,)."""
+    length = abs(motion[0]) * abs(physics.nx) + abs(motion[1]) * abs(physics.ny) + abs(motion[2]) * abs(physics.nz)
+    small[0] = _ULPS * (length + physics.reach)
+    small[1] = physics.stiffness * small[0] + physics.damping * _ULPS * fastest(physics, motion)
+
+
+@njit
+def fastest(physics: Physics, motion: Any) -> float:
+    """Return a speed that no node exceeds [m/s]."""
+    speed = math.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
+    if motion.shape[0] > SIZE_WITHOUT_SPIN:
+        spin = math.sqrt(motion[6] ** 2 + motion[7] ** 2 + motion[8] ** 2)
+        speed += physics.reach * spin / physics.inertia
+    return speed
+
+
+@njit
+def passes(regime: Any, switch: int) -> bool:
+    """Return whether a node that the ground does not push is about to leave it: no force changes by that."""
+    return switch % 2 == 0 and regime[switch // 2] == BELOW
+
+
+@njit
+def begin(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: Any, regime: Any, small: Any) -> None:
+    """Set the regime that a motion is in; small: from `vanishing`."""
+    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    for k in range(NODES):
+        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
+        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        # A node that is about at the ground is on the side to which it goes.
+        touching = abs(clearance) <= small[0]
+        below = speed < 0.0 if touching else clearance < 0.0
+        regime[k] = _answers(dragging, physics, below, clearance, speed)
+
+
+@njit
+def _answers(dragging: bool, physics: Physics, below: bool, clearance: float, speed: float) -> int:
+    if not below:
+        return PUSHED if dragging and -physics.damping * speed > 0.0 else 0
+    if physics.damping == 0.0 or -physics.stiffness * clearance - physics.damping * speed > 0.0:
+        return BELOW | PUSHED
+    return BELOW
+
+
+@njit
+def cross(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: Any, regime: Any, switch: int) -> None:
+    """Change the regime where a switch went through zero."""
+    k = switch // 2
+    if switch % 2:
+        regime[k] ^= PUSHED
+        return
+    _, _, _, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+    speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+    regime[k] = _answers(dragging, physics, regime[k] & BELOW == 0, 0.0, speed)
+
+
+@njit
+def force_free(regime: Any) -> bool:
+    """Return whether the ground leaves the body alone, and no node is below it."""
+    return not np.any(regime)
+
+
+@njit
+def take(turning: bool, state: Any, motion: Any) -> None:
+    """Set a motion to a state's, not turned yet."""
+    for axis in range(3):
+        motion[axis] = state.position[axis]
+        motion[3 + axis] = state.velocity[axis]
+    if turning:
+        for axis in range(3):
+            motion[6 + axis] = state.angular_momentum[axis]
+            motion[10 + axis] = 0.0
+        motion[9] = 1.0
+
+
+@njit
+def give(turning: bool, physics: Physics, nodes: Any, motion: Any, state: Any) -> None:
+    """Set a state to a motion's, turning the nodes it began with."""
+    for axis in range(3):
+        state.position[axis] = motion[axis]
+        state.velocity[axis] = motion[3 + axis]
+    if turning:
+        for axis in range(3):
+            state.angular_momentum[axis] = motion[6 + axis]
+            state.angular_velocity[axis] = motion[6 + axis] / physics.inertia
+        for k in range(NODES):
+            state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = _turned(motion, nodes, k)
+
+
+@njit
+def normalise(motion: Any) -> None:
+    """Give the quaternion the norm one."""
+    norm = math.sqrt(motion[9] ** 2 + motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
+    for part in range(9, 13):
+        motion[part] /= norm
+
+
+@njit
+def hardness(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, hard: Any) -> None:
+    """Set `hard` to the contact's frequency [rad/s], its fastest friction or damping [1/s], and its speed [m/s].
+
+    The frequency is a bound, from the trace of M⁻¹ S Σ JᵀJ over the nodes below the ground; the speed is that of the
+    contact's motion along the normal: the fastest node's, or what its depth or the weight stands for.
+    """
+    square = rubbing = speed_most = depth_most = 0.0
+    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    for k in range(NODES):
+        if regime[k] == 0:
+            continue
+        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        level = physics.nx * rx + physics.ny * ry + physics.nz * rz
+        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        pliancy = 1.0 / physics.mass
+        arm = rx * rx + ry * ry + rz * rz
+        along = pliancy + (arm - level * level) / physics.inertia if turning else pliancy
+        across = pliancy + arm / physics.inertia if turning else pliancy
+        push = -physics.damping * speed
+        if regime[k] & BELOW:
+            square += physics.stiffness * along
+            push -= physics.stiffness * (height + level)
+            speed_most = max(speed_most, abs(speed))
+            depth_most = max(depth_most, abs(height + level))
+        if regime[k] & PUSHED:
+            slip = math.sqrt(max(0.0, vx * vx + vy * vy + vz * vz - speed * speed))
+            rubbing += physics.friction * max(0.0, push) / (slip + physics.cutoff) * across + physics.damping * along
+    frequency = math.sqrt(square)
+    hard[0], hard[1] = frequency, rubbing
+    hard[2] = speed_most + frequency * depth_most
+    if frequency > 0.0:
+        hard[2] += physics.gravity / frequency
+
+
+@njit
+def slopes(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, by_speed: Any, by_place: Any) -> None:
+    """Set the slopes of u' and L', shape (6, 6) each: in u and L, and in place and I times rotation.
+
+    A node's force f n − μ f s/(|s| + ε), with f = S d − D u and s the velocity along the ground, changes with the
+    node's velocity v and place x by
+    −(n − μ s/(|s| + ε)) (D n·δv + S n·δx) − μ f/(|s| + ε) (δs − s (s·δs)/(|s| (|s| + ε))).
+    A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r).
+    """
+    for i in range(6):
+        for j in range(6):
+            by_speed[i, j] = by_place[i, j] = 0.0
+    by_velocity, by_shift, by_turn, lever = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3))
+    normal, slip, force, arm = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    normal[0], normal[1], normal[2] = physics.nx, physics.ny, physics.nz
+    for k in range(NODES):
+        if regime[k] & PUSHED == 0:
+            continue
+        arm[0], arm[1], arm[2], slip[0], slip[1], slip[2] = _node(turning, physics, nodes, motion, k)
+        speed = _dot(normal, slip)
+        spring = physics.stiffness if regime[k] & BELOW else 0.0
+        push = -physics.damping * speed - spring * (height + _dot(normal, arm))
+        for i in range(3):
+            slip[i] -= speed * normal[i]
+        length = math.sqrt(_dot(slip, slip))
+        long = length + physics.cutoff
+        grip = physics.friction * push / long
+        bend = grip / (length * long) if length > 0.0 else 0.0
+        for i in range(3):
+            force[i] = push * normal[i] - grip * slip[i]
+            for j in range(3):
+                pressed = (normal[i] - physics.friction * slip[i] / long) * normal[j]
+                by_velocity[i, j] = grip * normal[i] * normal[j] + bend * slip[i] * slip[j] - physics.damping * pressed
+                by_shift[i, j] = by_turn[i, j] = -spring * pressed
+            by_velocity[i, i] -= grip
+        _add(by_velocity, 1.0 / physics.mass, by_speed, 0, 0)
+        _add(by_shift, 1.0 / physics.mass, by_place, 0, 0)
+        if turning:
+            lever[0, 1], lever[0, 2], lever[1, 2] = arm[2], -arm[1], arm[0]
+            lever[1, 0], lever[2, 0], lever[2, 1] = -arm[2], arm[1], -arm[0]
+            _whirled(physics, motion, by_velocity, by_turn)
+            _turned_slopes(physics, lever, by_velocity, by_velocity, by_speed)
+            _turned_slopes(physics, lever, by_shift, by_turn, by_place)
+            _levered(physics, arm, force, by_place)
+
+
+@njit
+def _dot(a: Any, b: Any) -> float:
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@njit
+def _add(block: Any, factor: float, slope: Any, row: int, column: int) -> None:
+    for i in range(3):
+        for j in range(3):
+            slope[row + i, column + j] += factor * block[i, j]
+
+
+@njit
+def _whirled(physics: Physics, motion: Any, by_velocity: Any, by_turn: Any) -> None:
+    """Add to a force's slope in a node's place what changes with it as the node's velocity: ω × δx."""
+    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
+    for i in range(3):
+        x, y, z = by_velocity[i, 0], by_velocity[i, 1], by_velocity[i, 2]
+        by_turn[i, 0] += y * wz - z * wy
+        by_turn[i, 1] += z * wx - x * wz
+        by_turn[i, 2] += x * wy - y * wx
+
+
+@njit
+def _levered(physics: Physics, arm: Any, force: Any, slope: Any) -> None:
+    """Add how the torque of a force changes with its arm: (δθ × r) × f = r (δθ·f) − δθ (r·f)."""
+    along = _dot(arm, force)
+    for i in range(3):
+        for j in range(3):
+            slope[3 + i, 3 + j] += arm[i] * force[j] / physics.inertia
+        slope[3 + i, 3 + i] -= along / physics.inertia
+
+
+@njit
+def _turned_slopes(physics: Physics, lever: Any, of_centre: Any, of_turning: Any, slope: Any) -> None:
+    """Add what slopes of the force on one node are to the body by its turning, and to its torque.
+
+    lever: the matrix of δθ × r, of which the transpose makes the torque r × f out of f.
+    """
+    moved = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for p in range(3):
+                moved[i, j] += of_turning[i, p] * lever[p, j]
+    _add(moved, 1.0 / (physics.mass * physics.inertia), slope, 0, 3)
+    for i in range(3):
+        for j in range(3):
+            for p in range(3):
+                slope[3 + i, j] += lever[p, i] * of_centre[p, j]
+                slope[3 + i, 3 + j] += lever[p, i] * moved[p, j] / physics.inertia

@@ -1,0 +1,400 @@
+"""From event to event: exact flights, and in contact steps of high order, as long as their error allows.
+
+A flight is a parabola and a turn at constant spin; its touch-down is found to round-off (`touchdown.py`). From there on
+the motion obeys smooth equations until a node crosses the ground or the force on one reaches zero (`regime.py`). Each
+such event is located to round-off, and the integrator starts anew behind it, so that it keeps its order: it is Dormand
+and Prince's method of order 8 (`dormand_prince.py`), or where friction holds a node, whose motion is stiff then, an
+extrapolated linearly implicit Euler method (`extrapolation.py`). Steps scale with the contact's time, so that their
+number does not depend on the stiffness. The tolerance is of a step's error, relative to the motion of the contact: to
+its speed, and to that over its frequency as length.
+
+Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.6 (step size, events).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiffdice import dormand_prince, extrapolation, models
+from stiffdice.compiled import njit
+from stiffdice.regime import (
+    NODES,
+    SIZE,
+    SIZE_WITHOUT_SPIN,
+    SWITCHES,
+    begin,
+    cross,
+    derivative,
+    drags,
+    fastest,
+    force_free,
+    give,
+    hardness,
+    normalise,
+    passes,
+    switches,
+    take,
+    vanishing,
+)
+from stiffdice.state import Physics
+from stiffdice.touchdown import free_time
+
+
+class Event(NamedTuple):
+    """The tag of this scheme."""
+
+
+TAG = Event()
+
+# The velocity is that at the stored place.
+LAG = 0.0
+
+OWN_STEPS = True
+
+# An explicit step is not stable for longer than about this over the fastest friction or damping.
+_STIFF = 4.0
+
+# The first step of a contact: about what turns out to be right, as part of its 1/ω, over the tolerance's eighth root.
+_FIRST = 5.0
+
+# Where friction holds a node, its slip is of the order of the cutoff, and must be known to a part of that.
+_HELD = 0.1
+
+# A step is accepted whatever its error once it is shorter than this part of the contact's 1/ω or of all there is to go.
+_SHORTEST = 1e-13
+
+# Times that the location of an event may correct itself; it takes three or four.
+_CORRECTIONS = 30
+
+# Over less than this part of the contact's 1/ω a method of order 4 is exact to round-off.
+_NEAR = 1e-3
+
+
+class _Work(NamedTuple):
+    """What a contact is computed in: see `_work_of`."""
+
+    nodes: Any
+    bits: Any
+    here: Any
+    there: Any
+    scale: Any
+    stages: Any
+    table: Any
+    hard: Any
+    value: Any
+    slope: Any
+    small: Any
+
+
+@njit
+def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+    """Advance `state` by h [s] and return how often the forces were evaluated."""
+    # bool() keeps them from being taken for constants, for each of which all would be compiled again.
+    turning, dragging = bool(models.turns(model)), bool(physics.damping > 0.0 and drags(law))
+    left, evaluations = h, 0
+    while left > 0.0 and math.isfinite(state.position[2]):
+        if not dragging:
+            free = free_time(model, physics, state, left)
+            _fly(model, physics, state, free)
+            left -= free
+        if left > 0.0:
+            spent, count = _contact(turning, dragging, physics, state, left, tolerance)
+            left -= spent
+            evaluations += count
+    return evaluations
+
+
+@njit
+def _fly(model: Any, physics: Physics, state: Any, time: float) -> None:
+    """Take a free flight of so long [s]."""
+    fall = physics.weight / physics.mass
+    state.position[0] += time * state.velocity[0]
+    state.position[1] += time * state.velocity[1]
+    state.position[2] += time * (state.velocity[2] - 0.5 * fall * time)
+    state.velocity[2] -= fall * time
+    models.turn(model, physics, state, time)
+
+
+@njit
+def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
+    """Take so many steps of free flight."""
+    _fly(model, physics, state, steps * h)
+
+
+@njit
+def swing(
+    place: float, speed: float, h: float, steps: int, square: float, rate: float, constant: float
+) -> tuple[float, float]:
+    """Return that this is not known."""
+    return math.nan, math.nan
+
+
+@njit
+def _work_of(turning: bool, state: Any) -> Any:
+    size = SIZE if turning else SIZE_WITHOUT_SPIN
+    return _Work(
+        nodes=state.node_offset.copy(),
+        bits=np.zeros(NODES, np.int8),
+        here=np.zeros(size),
+        there=np.zeros(size),
+        scale=np.zeros(size),
+        stages=np.zeros((dormand_prince.STAGES + 1, size)),
+        table=np.zeros((extrapolation.COLUMNS, size)),
+        hard=np.zeros(3),
+        value=np.zeros((2, SWITCHES)),
+        slope=np.zeros((2, SWITCHES)),
+        small=np.zeros(2),
+    )
+
+
+@njit(cache=True)
+def _contact(
+    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float
+) -> tuple[float, int]:
+    """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations."""
+    work = _work_of(turning, state)
+    take(turning, state, work.here)
+    vanishing(physics, work.here, work.small)
+    begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
+    _look_from(turning, dragging, physics, work)
+    time, h, evaluations, idle = 0.0, 0.0, 1, 0
+    while time < most and (dragging or not force_free(work.bits)):
+        hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
+        if h == 0.0:
+            h = _first(physics, work, tolerance)
+        pace = min(h, most - time)
+        _tolerate(turning, physics, work, tolerance, pace)
+        error, order, count = _attempt(turning, physics, work, pace)
+        evaluations += count + 1
+        change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error > 0.0 else 5.0
+        if error > 1.0 and pace * max(work.hard[0], 1.0 / most) > _SHORTEST:
+            h = pace * min(change, 0.9)
+            continue
+        h = max(h, pace * change) if change > 1.0 else pace * change
+        _look_to(turning, dragging, physics, work)
+        lowest = _dip(work, pace)
+        if lowest < pace:
+            pace = lowest
+            evaluations += _attempt(turning, physics, work, pace)[2] + 1
+            _look_to(turning, dragging, physics, work)
+        zero = _first_zero(work, pace)
+        met = zero <= pace and idle <= SWITCHES
+        if met:
+            pace, count = _locate(turning, dragging, physics, work, zero, pace)
+            evaluations += count
+            idle = idle + 1 if pace == 0.0 else 0
+        time = most if pace == most - time else time + pace
+        changed = _cross_zeros(turning, dragging, physics, work)
+        _move_on(turning, work)
+        if changed:
+            _look_from(turning, dragging, physics, work)
+        if not math.isfinite(work.here[2]):
+            break
+    give(turning, physics, work.nodes, work.here, state)
+    return time, evaluations
+
+
+@njit
+def _look_from(turning: bool, dragging: bool, physics: Physics, work: Any) -> None:
+    """Evaluate rate and switches at the start of a step."""
+    rate, value, slope = work.stages[0], work.value[0], work.slope[0]
+    derivative(turning, physics, work.nodes, work.bits, work.here, rate)
+    switches(turning, dragging, physics, work.nodes, work.bits, work.here, rate, value, slope)
+
+
+@njit
+def _look_to(turning: bool, dragging: bool, physics: Physics, work: Any) -> None:
+    """Evaluate rate and switches at the end of a step."""
+    rate, value, slope = work.stages[dormand_prince.STAGES], work.value[1], work.slope[1]
+    derivative(turning, physics, work.nodes, work.bits, work.there, rate)
+    switches(turning, dragging, physics, work.nodes, work.bits, work.there, rate, value, slope)
+
+
+@njit
+def _move_on(turning: bool, work: Any) -> None:
+    """Start from where the step ended."""
+    if turning:
+        normalise(work.there)
+    for part in range(work.here.shape[0]):
+        work.here[part] = work.there[part]
+        work.stages[0, part] = work.stages[dormand_prince.STAGES, part]
+    for switch in range(SWITCHES):
+        work.value[0, switch] = work.value[1, switch]
+        work.slope[0, switch] = work.slope[1, switch]
+
+
+@njit
+def _tolerate(turning: bool, physics: Physics, work: Any, tolerance: float, h: float) -> None:
+    """Set what error is tolerated of each part of the motion in a step of h [s]."""
+    here, scale, hard = work.here, work.scale, work.hard
+    vanishing(physics, here, work.small)
+    speed = fastest(physics, here)
+    if hard[0] * physics.reach > hard[2]:
+        length, pace = hard[2] / hard[0], hard[2]
+    else:
+        length, pace = physics.reach, max(speed, math.sqrt(physics.gravity * physics.reach))
+    # What round-off does to a step is no error of it.
+    noise = 1.0
+    length, pace = tolerance * length, tolerance * pace
+    if hard[1] * h > _STIFF:
+        noise, pace = extrapolation.NOISE, min(pace, _HELD * physics.cutoff)
+    length = max(length, noise * work.small[0])
+    pace = max(pace, noise * (work.small[0] * hard[0] + 2.0**-49 * speed))
+    for axis in range(3):
+        scale[axis], scale[3 + axis] = length, pace
+    if turning:
+        for axis in range(3):
+            scale[6 + axis] = pace * physics.inertia / physics.reach
+        for part in range(9, SIZE):
+            scale[part] = length / physics.reach
+
+
+@njit
+def _first(physics: Physics, work: Any, tolerance: float) -> float:
+    """Return the step [s] to try first."""
+    fastest = max(work.hard[0], math.sqrt(physics.gravity / physics.reach), 1e-300)
+    return _FIRST * tolerance ** (1.0 / dormand_prince.ORDER) / fastest
+
+
+@njit
+def _attempt(turning: bool, physics: Physics, work: Any, h: float) -> tuple[float, int, int]:
+    """Step by h [s]; return the error over what is tolerated, the order of its estimate, and evaluations."""
+    if work.hard[1] * h > _STIFF:
+        error = extrapolation.step(
+            turning,
+            physics,
+            work.nodes,
+            work.bits,
+            work.here,
+            work.stages[0],
+            h,
+            work.table,
+            work.there,
+            work.scale,
+        )
+        return error, extrapolation.ORDER, extrapolation.EVALUATIONS
+    dormand_prince.step(turning, physics, work.nodes, work.bits, work.here, h, work.stages, work.there)
+    return dormand_prince.error(work.stages, work.scale, h), dormand_prince.ORDER, dormand_prince.STAGES - 1
+
+
+@njit
+def _cubic(work: Any, switch: int, h: float, s: float) -> float:
+    """Return a switch at part s of a step, on the cubic through its values and slopes at both ends (Hermite)."""
+    p, q = work.value[0, switch], work.value[1, switch]
+    u, v = h * work.slope[0, switch], h * work.slope[1, switch]
+    return float(p + s * (u + s * (3 * (q - p) - 2 * u - v + s * (2 * (p - q) + u + v))))
+
+
+@njit
+def _dip(work: Any, h: float) -> float:
+    """Return when [s] within a step a switch that is positive at both ends seems lowest below zero; h if none is."""
+    lowest = h
+    for switch in range(SWITCHES):
+        falls, rises = work.slope[0, switch] < 0.0, work.slope[1, switch] > 0.0
+        if not (falls and rises and work.value[0, switch] > 0.0 and work.value[1, switch] > 0.0):
+            continue
+        low, high = 0.0, 1.0
+        for _ in range(40):
+            left, right = low + (high - low) / 3, high - (high - low) / 3
+            if _cubic(work, switch, h, left) < _cubic(work, switch, h, right):
+                high = right
+            else:
+                low = left
+        if _cubic(work, switch, h, low) < 0.0:
+            lowest = min(lowest, low * h)
+    return lowest
+
+
+@njit
+def _falls_to_zero(work: Any, switch: int) -> bool:
+    """Return whether a switch is at zero but for round-off and falling at the end of a step, or below."""
+    value, small = work.value[1, switch], work.small[switch % 2]
+    return bool(value < -small or (value <= small and work.slope[1, switch] < 0.0))
+
+
+@njit
+def _first_zero(work: Any, h: float) -> float:
+    """Return about when [s] within a step the first switch falls to zero; infinite if none does."""
+    first = math.inf
+    for switch in range(SWITCHES):
+        if passes(work.bits, switch) or not _falls_to_zero(work, switch):
+            continue
+        low, high = 0.0, 1.0
+        while high - low > 1e-9:
+            middle = (low + high) / 2
+            if _cubic(work, switch, h, middle) > 0.0:
+                low = middle
+            else:
+                high = middle
+        first = min(first, high * h)
+    return first
+
+
+@njit
+def _locate(turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float) -> tuple[float, int]:
+    """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, and evaluations."""
+    evaluations = _attempt(turning, physics, work, when)[2] + 1
+    _look_to(turning, dragging, physics, work)
+    for _ in range(_CORRECTIONS):
+        better = min(most, max(0.0, when + _correction(work, when)))
+        if better == when:
+            break
+        change = better - when
+        if abs(change) * max(work.hard[0], work.hard[1]) < _NEAR:
+            _shift(turning, physics, work, change)
+            evaluations += 4
+        else:
+            evaluations += _attempt(turning, physics, work, better)[2] + 1
+        _look_to(turning, dragging, physics, work)
+        when = better
+    return when, evaluations
+
+
+@njit
+def _shift(turning: bool, physics: Physics, work: Any, h: float) -> None:
+    """Move the end of the step by h [s], so short that the classical method of Runge and Kutta is exact."""
+    stages, there, trial = work.stages, work.there, work.stages[1]
+    first, weights = dormand_prince.STAGES, (0.5, 0.5, 1.0)
+    for part in range(there.shape[0]):
+        trial[part] = there[part] + 0.5 * h * stages[first, part]
+    for stage in range(3):
+        derivative(turning, physics, work.nodes, work.bits, trial, stages[2 + stage])
+        for part in range(there.shape[0]):
+            trial[part] = there[part] + weights[stage] * h * stages[2 + stage, part]
+    for part in range(there.shape[0]):
+        outer, inner = stages[first, part] + stages[4, part], stages[2, part] + stages[3, part]
+        there[part] += h / 6 * (outer + 2 * inner)
+
+
+@njit
+def _correction(work: Any, when: float) -> float:
+    """Return by how much [s] the first zero is off, by Newton's method on the switches that have passed or reach it."""
+    back, ahead, there = 0.0, math.inf, False
+    for switch in range(SWITCHES):
+        value, slope, small = work.value[1, switch], work.slope[1, switch], work.small[switch % 2]
+        if passes(work.bits, switch):
+            continue
+        if value < -small:
+            back = min(back, -value / slope if slope < 0.0 else -when / 2)
+        elif slope < 0.0:
+            there = there or value <= small
+            ahead = min(ahead, -value / slope)
+    if back < 0.0:
+        return back
+    return 0.0 if there or ahead == math.inf else ahead
+
+
+@njit
+def _cross_zeros(turning: bool, dragging: bool, physics: Physics, work: Any) -> bool:
+    """Change the regime for every switch that fell to zero in a step; return whether one did."""
+    crossed = False
+    for node in range(NODES):
+        for switch in (2 * node, 2 * node + 1):
+            if _falls_to_zero(work, switch):
+                cross(turning, dragging, physics, work.nodes, work.there, work.bits, switch)
+                crossed = True
+                break
+    return crossed
