@@ -9,18 +9,16 @@ from stiffdice.reference import SAMPLES
 from stiffdice.scene import from_mapping
 from stiffdice.state import start_of
 
-EULER = "symplectic_euler"
 HALF = 1.0352761804100830 / 2  # of the side
 
 
 def made(horizon, model="sliding", **keys):
     scene = from_mapping(keys)
-    return references(scene, model, EULER, start_of(scene, model), horizon)
+    return references(scene, model, start_of(scene, model), horizon)
 
 
 @pytest.mark.parametrize("velocity", [[5, 0, 5], [0, 0, 0], [1, 2, -3]])
 def test_a_flight_is_the_parabola_itself(velocity):
-    """The launch is set back by what the scheme's velocity lags: nothing of the step is left in the path."""
     launch = {"position": [0, 0, 9], "velocity": velocity}
     found, error = made(0.8, ground={"contact": "gated"}, launch=launch)
     t = np.linspace(0, 0.8, SAMPLES + 1)[:, None]
@@ -42,21 +40,21 @@ def test_a_bounce_is_the_damped_oscillators():
     t = np.linspace(0, horizon, SAMPLES + 1)
     exact = HALF - speed / omega * np.exp(-beta * t) * np.sin(omega * t)
     off = np.abs(found["position"][0, :, 2] - exact).max()
-    assert off < 1e-5
-    assert 0.5 * off < error < 3 * off  # it knows how far off it is
+    assert off < 1e-11
+    assert error < 1e-11
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6])
 def test_it_is_small_whatever_the_stiffness(stiffness):
     """Over the first bounce, as part of a radius."""
-    assert made(1.8, ground={"contact": "gated", "stiffness": stiffness})[1] < 2e-3
+    assert made(1.8, ground={"contact": "gated", "stiffness": stiffness})[1] < 1e-7
 
 
 def test_each_launch_has_its_own():
     scene = from_mapping({"ground": {"contact": "gated"}})
     launches = np.repeat(start_of(scene, "sliding"), 3)
     launches["position"][:, 0] = [0, 1, 2]
-    found, _ = references(scene, "sliding", EULER, launches, 1.0)
+    found, _ = references(scene, "sliding", launches, 1.0)
     np.testing.assert_allclose(found["position"][:, 0, 0], [0, 1, 2])
     np.testing.assert_allclose(found["position"][:, -1, 0], [5, 6, 7], rtol=1e-12)
 
@@ -65,14 +63,11 @@ def test_the_launches_are_left_as_they_are():
     scene = from_mapping({})
     launches = start_of(scene, "sliding")
     before = launches.copy()
-    references(scene, "sliding", EULER, launches, 1.0)
+    references(scene, "sliding", launches, 1.0)
     np.testing.assert_array_equal(launches, before)
 
 
-def test_a_reference_that_is_no_number_is_refused():
-    with pytest.raises(InputError, match=r"trajectory: its reference, \d+ steps, left the range of doubles"):
-        made(1.0, gravity=1e308, launch={"velocity": [0, 0, -1.7e308]})
-
-
-def test_a_path_too_long_to_measure_is_no_warning():
-    assert made(1.0, gravity=1e306)[1] == np.inf
+@pytest.mark.parametrize("gravity", [1e308, 1e306, 1e200])
+def test_a_reference_that_is_no_number_is_refused(gravity):
+    with pytest.raises(InputError, match="trajectory: its reference left the range of doubles"):
+        made(1.0, gravity=gravity, launch={"velocity": [0, 0, -gravity]})

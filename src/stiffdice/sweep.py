@@ -77,7 +77,7 @@ def _compute_cells(sweep: Sweep, column: Column, scan: Sequence[int], spool: Spo
         compared = None
         if "trajectory" in sweep.criteria:
             distinct = launches[block] if sweep.model in TURNING else launches[:1]
-            compared, _ = references(scene, sweep.model, sweep.scheme, distinct, sweep.horizon)
+            compared, _ = references(scene, sweep.model, distinct, sweep.horizon)
         for batch in range(0, len(scan), CHUNK_CELLS):
             runs = [_run(sweep, scene, steps, launches, block, compared) for steps in scan[batch : batch + CHUNK_CELLS]]
             cells = slice(first + batch, first + batch + len(runs))

@@ -162,7 +162,7 @@ def test_a_stopped_run_is_judged_by_what_it_was_asked():
 def test_trajectory_and_the_others_share_the_decision():
     """The run goes on past the horizon until the others are decided, too."""
     scene = from_mapping({"ground": {"stiffness": 1e6, "contact": "gated"}})
-    compared, _ = references(scene, "sliding", "symplectic_euler", start_of(scene, "sliding"), 1.0)
+    compared, _ = references(scene, "sliding", start_of(scene, "sliding"), 1.0)
     stop = {"energy": 0.05, "trajectory": 0.05}
     run = simulate(scene, model="sliding", steps=15_000, references=compared, stop=stop, criteria=stop)
     at_energy, at_horizon = run.decided[0, 1], run.decided[0, 4]

@@ -66,6 +66,9 @@ _HELD = 0.1
 # A step is accepted whatever its error once it is shorter than this part of the contact's 1/ω or of all there is to go.
 _SHORTEST = 1e-13
 
+# After so many such steps in a row the motion is beyond doubles, and becomes not-a-number.
+_FORCED = 100
+
 # Times that the location of an event may correct itself; it takes three or four.
 _CORRECTIONS = 30
 
@@ -160,7 +163,7 @@ def _contact(
     vanishing(physics, work.here, work.small)
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
     _look_from(turning, dragging, physics, work)
-    time, h, evaluations, idle = 0.0, 0.0, 1, 0
+    time, h, evaluations, idle, forced = 0.0, 0.0, 1, 0, 0
     while time < most and (dragging or not force_free(work.bits)):
         hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
         if h == 0.0:
@@ -169,10 +172,17 @@ def _contact(
         _tolerate(turning, physics, work, tolerance, pace)
         error, order, count = _attempt(turning, physics, work, pace)
         evaluations += count + 1
-        change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error > 0.0 else 5.0
-        if error > 1.0 and pace * max(work.hard[0], 1.0 / most) > _SHORTEST:
-            h = pace * min(change, 0.9)
-            continue
+        change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else 5.0
+        if not error <= 1.0:
+            if pace * max(work.hard[0], 1.0 / most) > _SHORTEST:
+                h = pace * min(change, 0.9)
+                continue
+            forced += 1
+        else:
+            forced = 0
+        if forced > _FORCED or not math.isfinite(work.small[1]):
+            work.here[:] = math.nan
+            break
         h = max(h, pace * change) if change > 1.0 else pace * change
         _look_to(turning, dragging, physics, work)
         lowest = _dip(work, pace)
