@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stiffdice.compiled import njit
+from stiffdice.contact import LAWS, normal_force, normal_slopes
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
 
@@ -95,3 +97,32 @@ def test_a_throw_against_a_second_implementation(contact, normal):
     theirs = stepped(scene, 6000, gated=contact == "gated")
     assert (ours[:, 2] < 1).any()  # it did land
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
+
+
+@njit
+def _normal(law, depth, speed, stiffness, damping):
+    force = normal_force(law, depth, speed, stiffness, damping)
+    return force, normal_slopes(law, depth, speed, stiffness, damping)
+
+
+@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("depth", [-0.3, -1e-3, 2e-3, 0.5])
+@pytest.mark.parametrize("speed", [-2.0, -0.1, 0.03, 3.0, 80.0])
+def test_slopes_are_those_of_the_force(contact, depth, speed):
+    """Against differences, at points to either side of every kink of the law, pushing and not."""
+    law, stiffness, damping, off = LAWS[contact], 100.0, 1.5, 1e-7
+    _, (by_depth, by_speed) = _normal(law, depth, speed, stiffness, damping)
+    deeper, shallower = (_normal(law, depth + s, speed, stiffness, damping)[0] for s in (off, -off))
+    faster, slower = (_normal(law, depth, speed + s, stiffness, damping)[0] for s in (off, -off))
+    assert by_depth == pytest.approx((deeper - shallower) / (2 * off), rel=1e-6)
+    assert by_speed == pytest.approx((faster - slower) / (2 * off), rel=1e-6)
+    assert by_depth in (0, stiffness)
+    assert by_speed in (0, -damping)
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_a_ground_that_does_not_push_has_no_slope(contact):
+    """At the kinks themselves, too: on the ground at rest, and where damping pulls as much as the spring pushes."""
+    for depth, speed in ((0.0, 0.0), (0.0, 1.0), (0.03, 2.0)):
+        force, slopes = _normal(LAWS[contact], depth, speed, 100.0, 1.5)
+        assert (force, slopes) == (0, (0, 0))

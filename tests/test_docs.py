@@ -13,8 +13,10 @@ import pytest
 import yaml
 
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES
+from stiffdice.cli import main
 from stiffdice.criteria import CRITERIA
 from stiffdice.scene import PRESETS, Scene
+from stiffdice.schemes import SCHEMES
 
 ROOT = Path(__file__).parent.parent
 PAGES = ["README.md", "config/README.md", "results/README.md", "docs/method.md", "docs/stability.md", "CHANGELOG.md"]
@@ -84,6 +86,16 @@ def test_every_option_of_an_experiment_is_explained():
 def test_every_drawing_is_named():
     text = (ROOT / "config/README.md").read_text()
     assert all(f"`{name}`" in text for name in [*DRAWINGS, *TABLES, *EXPERIMENTS])
+
+
+def test_every_scheme_is_explained(capsys):
+    rows = [row[0] for row in table_keys("config/README.md", "Study")]
+    assert [name for name in rows if name.strip("`") in SCHEMES] == [f"`{name}`" for name in SCHEMES]
+    assert all(f"`{name}`" in (ROOT / "docs/method.md").read_text() for name in SCHEMES)
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    told = capsys.readouterr().out
+    assert all(name in told for name in SCHEMES)
 
 
 def test_make_targets_of_the_readme_exist():

@@ -69,7 +69,8 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--scheme",
         default="symplectic_euler",
         metavar="NAME",
-        help="time-stepping scheme (default: symplectic_euler)",
+        help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
+        "or exact where that is known (default: symplectic_euler)",
     )
     run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
     run.add_argument(

@@ -32,6 +32,13 @@ def _ungated_force(depth: float, speed: float, stiffness: float, damping: float)
 
 
 @njit
+def _ungated_slopes(depth: float, speed: float, stiffness: float, damping: float) -> tuple[float, float]:
+    if not stiffness * max(0.0, depth) - damping * speed > 0.0:
+        return 0.0, 0.0
+    return (stiffness if depth > 0.0 else 0.0), -damping
+
+
+@njit
 def _ungated_reaches(clearance: float) -> bool:
     return True
 
@@ -45,6 +52,13 @@ def _gated_force(depth: float, speed: float, stiffness: float, damping: float) -
 
 
 @njit
+def _gated_slopes(depth: float, speed: float, stiffness: float, damping: float) -> tuple[float, float]:
+    if not (depth > 0.0 and stiffness * depth - damping * speed > 0.0):
+        return 0.0, 0.0
+    return stiffness, -damping
+
+
+@njit
 def _gated_reaches(clearance: float) -> bool:
     return clearance <= 0.0
 
@@ -52,6 +66,10 @@ def _gated_reaches(clearance: float) -> bool:
 # (law, depth, speed, stiffness, damping) -> the magnitude of the normal force on a node [N]. depth [m]: distance below
 # the ground, negative above it. speed [m/s]: along the outward normal.
 normal_force = by_tag({Ungated: _ungated_force, Gated: _gated_force})
+
+# (law, depth, speed, stiffness, damping) -> by how much the normal force on a node grows with its depth [N/m] and its
+# speed [kg/s]; none of either where it does not push.
+normal_slopes = by_tag({Ungated: _ungated_slopes, Gated: _gated_slopes})
 
 # (law, clearance) -> whether the law can act on a body whose every node is at least `clearance` [m] above the ground.
 reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})

@@ -129,12 +129,15 @@ def skip(scheme: Any, model: Any, law: Any, physics: Physics, state: Any, sight:
     """
     if models.turns(model) or not sight.room > 0.0:
         return 0
+    proven = schemes.proven(scheme)
     rubs = physics.friction > 0.0 and (state.velocity[0] != 0.0 or state.velocity[1] != 0.0)
-    stays = _rests(law, physics, sight) or (not rubs and (sight.still > 0.0 or _hangs(law, physics, sight)))
+    stays = not rubs and sight.still > 0.0
+    if proven and not stays:
+        stays = _rests(law, physics, sight) or (not rubs and _hangs(law, physics, sight))
     if stays and sight.held == 0.0:
         sight.held = 1.0
         return 0
-    if physics.nz != 1.0 or rubs or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
+    if not proven or physics.nz != 1.0 or rubs or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
         return 0
     h = sight.step_size
     sight.clearance = sight.height - lowest_of(physics, state)  # far from the ground it was a lower bound

@@ -30,6 +30,10 @@ STATE = np.dtype(
 )
 
 
+# Velocity [m/s] and spin [rad/s] of a body, or what they come to in a step: a shift [m] and a rotation vector [rad].
+Motion = tuple[float, float, float, float, float, float]
+
+
 class Physics(NamedTuple):
     """The numbers of a scene that the forces need; SI units, the ground's constants per node."""
 

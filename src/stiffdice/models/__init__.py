@@ -17,11 +17,17 @@ MODELS = {name: module.TAG for name, module in _MODULES.items()}
 # (model, law, physics, state) -> force [N] and torque [N m] on the body in this state.
 force = by_tag({type(module.TAG): module.force for module in _MODULES.values()})
 
-# (model, physics, state, wrench, h): advance the momenta by h [s] under a force and torque.
+# (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
 kick = by_tag({type(module.TAG): module.kick for module in _MODULES.values()})
 
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
 drift = by_tag({type(module.TAG): module.drift for module in _MODULES.values()})
+
+# (model, physics, state) -> the velocity [m/s] and the spin [rad/s] at which place and orientation change.
+motion = by_tag({type(module.TAG): module.motion for module in _MODULES.values()})
+
+# (model, state, shift): shift place by the first three [m], and turn the body by the rotation vector of the rest [rad].
+move = by_tag({type(module.TAG): module.move for module in _MODULES.values()})
 
 # (model, physics, state, duration): turn the body at its present spin for so long [s], as in a free flight.
 turn = by_tag({type(module.TAG): module.turn for module in _MODULES.values()})

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
 from stiffdice.contact import Wrench, height_of, lowest_of, node_force, reaches
-from stiffdice.state import Physics
+from stiffdice.state import Motion, Physics
 
 
 class Sliding(NamedTuple):
@@ -48,6 +48,20 @@ def drift(physics: Physics, state: Any, h: float) -> None:
     state.position[0] += h * state.velocity[0]
     state.position[1] += h * state.velocity[1]
     state.position[2] += h * state.velocity[2]
+
+
+@njit
+def motion(physics: Physics, state: Any) -> Motion:
+    """Return the velocity [m/s], and no spin."""
+    return state.velocity[0], state.velocity[1], state.velocity[2], 0.0, 0.0, 0.0
+
+
+@njit
+def move(state: Any, shift: Motion) -> None:
+    """Shift the position by the first three [m]."""
+    state.position[0] += shift[0]
+    state.position[1] += shift[1]
+    state.position[2] += shift[2]
 
 
 @njit

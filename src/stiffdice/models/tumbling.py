@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from stiffdice.compiled import njit
 from stiffdice.contact import Wrench, height_of, node_force, reaches
 from stiffdice.models import sliding
-from stiffdice.state import Physics
+from stiffdice.state import Motion, Physics
 
 
 class Tumbling(NamedTuple):
@@ -46,11 +46,12 @@ def force(law: Any, physics: Physics, state: Any) -> Wrench:
 
 @njit
 def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
-    """Advance velocity and angular momentum by h [s] under force and torque (equations 6 and 8)."""
+    """Advance velocity and angular momentum, and the spin with it, by h [s] (equations 6 and 8)."""
     sliding.kick(physics, state, wrench, h)
     state.angular_momentum[0] += h * wrench[3]
     state.angular_momentum[1] += h * wrench[4]
     state.angular_momentum[2] += h * wrench[5]
+    _spin(physics, state)
 
 
 @njit
@@ -61,15 +62,40 @@ def drift(physics: Physics, state: Any, h: float) -> None:
 
 
 @njit
+def motion(physics: Physics, state: Any) -> Motion:
+    """Return the velocity [m/s] and the spin [rad/s] that the angular momentum says."""
+    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
+    return ux, uy, uz, lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
+
+
+@njit
+def move(state: Any, shift: Motion) -> None:
+    """Shift the position by the first three [m], and turn the nodes by the rotation vector of the others [rad]."""
+    sliding.move(state, shift)
+    ax, ay, az = shift[3], shift[4], shift[5]
+    angle = math.sqrt(ax * ax + ay * ay + az * az)
+    if angle > 0.0:
+        _rotate(state, ax / angle, ay / angle, az / angle, angle)
+
+
+@njit
 def turn(physics: Physics, state: Any, duration: float) -> None:
     """Turn the nodes for so long [s] at the spin that the angular momentum says (equation 9)."""
+    wx, wy, wz = _spin(physics, state)
+    rate = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if rate > 0.0:
+        _rotate(state, wx / rate, wy / rate, wz / rate, rate * duration)
+
+
+@njit
+def _spin(physics: Physics, state: Any) -> tuple[float, float, float]:
+    """Let the nodes move with the spin that the angular momentum says, and return it [rad/s]."""
     wx = state.angular_momentum[0] / physics.inertia
     wy = state.angular_momentum[1] / physics.inertia
     wz = state.angular_momentum[2] / physics.inertia
     state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2] = wx, wy, wz
-    rate = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if rate > 0.0:
-        _rotate(state, wx / rate, wy / rate, wz / rate, rate * duration)
+    return wx, wy, wz
 
 
 @njit

@@ -1,29 +1,48 @@
-"""Time-stepping schemes. A scheme is a module with TAG, LAG, `step`, `flight` and `swing`; one line registers it."""
+"""Time-stepping schemes. A scheme is a module with TAG, LAG, `step` and `flight`; one line registers it.
+
+It may also have a `swing`, and say that what `phases.py` takes at once is `proven` for it; otherwise those of
+`closed.py` stand for it, and its contacts are stepped.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from stiffdice.compiled import by_tag
-from stiffdice.schemes import event, symplectic_euler
+from stiffdice.schemes import closed, event, forward_euler, implicit_euler, rk4, symplectic_euler, velocity_verlet
 
 _MODULES: dict[str, Any] = {
     "symplectic_euler": symplectic_euler,
+    "forward_euler": forward_euler,
+    "velocity_verlet": velocity_verlet,
+    "rk4": rk4,
+    "implicit_euler": implicit_euler,
     "event": event,
 }
 
 SCHEMES = {name: module.TAG for name, module in _MODULES.items()}
 
+
+def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:
+    """Return the function of this name that a scheme has, or what is to stand for it, chosen by the scheme's tag."""
+    return by_tag({type(module.TAG): getattr(module, part, *otherwise) for module in _MODULES.values()})
+
+
 # (scheme, model, law, physics, state, h, tolerance) -> force evaluations: advance `state` by one step of h [s]. Only a
 # scheme that controls its own error looks at the tolerance [1] of it.
-step = by_tag({type(module.TAG): module.step for module in _MODULES.values()})
+step = _chosen("step")
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
-flight = by_tag({type(module.TAG): module.flight for module in _MODULES.values()})
+flight = _chosen("flight")
 
 # (scheme, place, speed, h, steps, square, rate, constant) -> the change of place and the new speed after so many steps
-# at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off.
-swing = by_tag({type(module.TAG): module.swing for module in _MODULES.values()})
+# at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off; both
+# not-a-number where that is not known.
+swing = _chosen("swing", closed.swing)
+
+# (scheme) -> whether the bounds of `phases.py`, for how long a phase lasts and what stays at rest, hold for it.
+proven = _chosen("proven", closed.proven)
 
 # What a scheme that controls its own error aims at, relative to the motion, unless told otherwise.
 TOLERANCE = 1e-9

@@ -39,6 +39,7 @@ from stiffdice.regime import (
     take,
     vanishing,
 )
+from stiffdice.schemes import closed
 from stiffdice.state import Physics
 from stiffdice.touchdown import free_time
 
@@ -101,7 +102,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     while left > 0.0 and math.isfinite(state.position[2]):
         if not dragging:
             free = free_time(model, physics, state, left)
-            _fly(model, physics, state, free)
+            flight(model, physics, state, free, 1)
             left -= free
         if left > 0.0:
             spent, count = _contact(turning, dragging, physics, state, left, tolerance)
@@ -111,28 +112,9 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
 
 
 @njit
-def _fly(model: Any, physics: Physics, state: Any, time: float) -> None:
-    """Take a free flight of so long [s]."""
-    fall = physics.weight / physics.mass
-    state.position[0] += time * state.velocity[0]
-    state.position[1] += time * state.velocity[1]
-    state.position[2] += time * (state.velocity[2] - 0.5 * fall * time)
-    state.velocity[2] -= fall * time
-    models.turn(model, physics, state, time)
-
-
-@njit
 def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
     """Take so many steps of free flight."""
-    _fly(model, physics, state, steps * h)
-
-
-@njit
-def swing(
-    place: float, speed: float, h: float, steps: int, square: float, rate: float, constant: float
-) -> tuple[float, float]:
-    """Return that this is not known."""
-    return math.nan, math.nan
+    closed.flight(model, physics, state, h, steps, LAG)
 
 
 @njit
