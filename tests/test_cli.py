@@ -85,7 +85,12 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", SCENE, "-o", "out.h5", "--steps", "1e400"], "--steps = inf: allowed"),
         (["run", SCENE, "-o", "out.h5", "--every", "0"], "--every = 0: allowed"),
         (["run", SCENE, "-o", "out.h5", "--every", "10001"], "every = 10001: allowed"),
-        (["run", SCENE, "-o", "out.h5", "--model", "flying"], "model = flying: allowed is sliding or tumbling"),
+        (["run", SCENE, "-o", "out.h5", "--model", "falling"], "model = falling: allowed is vertical or sliding or"),
+        (["run", SCENE, "-o", "out.h5", "--model", "flying"], "model = flying: allowed for scenes in which the ground"),
+        (
+            ["run", SCENE, "-o", "out.h5", "--model", "vertical", "--set", "ground.normal=[1, 0, 2]"],
+            "level ground, [0, 0,",
+        ),
         (["run", SCENE, "-o", "out.h5", "--scheme", "magic"], "scheme = magic: allowed is symplectic_euler"),
         (["run", SCENE, "-o", "out.h5", "--preset", "wrong"], "preset = wrong: allowed is as_listed or"),
         (["run", SCENE, "-o", "out.h5", "--set", "ground.stifness=1"], "did you mean stiffness?"),
@@ -125,6 +130,21 @@ def test_inspect_tells_verdict_scene_and_units(stiffdice):
     ):
         assert words in out, words
     assert "trajectory_error" not in out  # it was not compared with anything
+
+
+def test_auto_says_which_model_and_why_and_stores_it(stiffdice):
+    options = ["--model", "auto", "--set", "launch.velocity=[0, 0, 5]", "--steps", "2000", "--ledger", "-o", "out.h5"]
+    status, out, err, _ = stiffdice("run", SCENE, *options)
+    reason = "vertical: the cube lands flat without spin and nothing moves it sideways"
+    assert (status, err) == (0, "")
+    assert out.startswith(f"{reason}\nout.h5: ")
+    with xr.open_dataset("out.h5") as found:
+        assert (found.attrs["model"], found.attrs["model_reason"]) == ("vertical", reason)
+        assert (found.position[:, :2] == 0).all()
+        assert abs(float(found.friction_work)) == 0
+    told = stiffdice("inspect", "out.h5")[1]
+    assert "  model: vertical\n" in told
+    assert f"  model_reason: {reason}\n" in told
 
 
 def test_inspect_json_is_for_programs(stiffdice):

@@ -21,21 +21,23 @@ from stiffdice.models import MODELS
 from stiffdice.scene import from_mapping, load
 from stiffdice.schemes import LAGS
 from stiffdice.simulate import simulate
-from stiffdice.state import physics_of
+from stiffdice.state import TOUCHING, physics_of
 
 SCENES = Path(__file__).parent.parent / "config" / "scenes"
 LOSSLESS = {"contact": "gated", "damping": 0, "friction": 0}
 HALF = 1.0352761804100830 / 2  # of the side
 EULER = "symplectic_euler"
 
+LANDING = [name for name in MODELS if name in TOUCHING]  # a cube that lands is not one that flies
 # Every scheme, but every model and law of the paper's only: each combination is compiled for some seconds.
 OTHERS = [(scheme, "tumbling", "gated") for scheme in BOOKED if scheme != EULER]
-for_all = pytest.mark.parametrize(("scheme", "model", "contact"), [*itertools.product([EULER], MODELS, LAWS), *OTHERS])
+for_all = pytest.mark.parametrize(("scheme", "model", "contact"), [*itertools.product([EULER], LANDING, LAWS), *OTHERS])
 
 
-def rough(contact, **ground):
-    """Friction, damping, a slope and spin."""
-    slope = {"stiffness": 3e3, "damping": 0.5, "friction": 0.3, "normal": [0.2, -0.1, 1], "contact": contact}
+def rough(contact, model="tumbling", **ground):
+    """Friction, damping, a slope and spin; `vertical` takes level ground."""
+    normal = [0, 0, 1] if model == "vertical" else [0.2, -0.1, 1]
+    slope = {"stiffness": 3e3, "damping": 0.5, "friction": 0.3, "normal": normal, "contact": contact}
     launch = {"velocity": [2, 1, 3], "angular_momentum": [0.3, 0.5, -0.2]}
     return from_mapping({"ground": slope | ground, "launch": launch, "duration": 5.0})
 
@@ -59,12 +61,12 @@ def clearance_of(scene, states):
 @for_all
 @pytest.mark.parametrize("steps", [300, 3_000, 100_000])
 def test_the_parts_add_up_to_the_change_of_the_energy(scheme, model, contact, steps):
-    scene = rough(contact)
+    scene = rough(contact, model)
     kept = keep(scene, model=model, scheme=scheme, steps=steps)
     run = simulate(scene, model=model, scheme=scheme, steps=steps, every=1)
     each = energy_of(scene, scheme, steps, run.trajectory.state)
     close = 3e-14 * np.abs(each).max()
-    assert kept.bounce_count > (0 if scheme == "forward_euler" else 2)  # at 300 steps its first bounce is its last
+    assert kept.bounce_count >= (1 if scheme == "forward_euler" else 2)  # at 300 steps its first bounce is its last
     assert kept.launch_energy == pytest.approx(each[0], abs=close)
     assert kept.end_energy == pytest.approx(each[-1], abs=close)
     assert kept.run.energy_change == pytest.approx(each[-1] - each[0], abs=close)
@@ -76,7 +78,7 @@ def test_the_parts_add_up_to_the_change_of_the_energy(scheme, model, contact, st
 
 @for_all
 def test_bounces_and_flights_add_up_to_the_run(scheme, model, contact):
-    kept = keep(rough(contact), model=model, scheme=scheme, steps=10_000)
+    kept = keep(rough(contact, model), model=model, scheme=scheme, steps=10_000)
     assert kept.bounce_count == len(kept.bounces.first_step)
     for part in dataclasses.fields(kept.run):
         bounces = getattr(kept.bounces.works, part.name).sum()
@@ -86,7 +88,7 @@ def test_bounces_and_flights_add_up_to_the_run(scheme, model, contact):
 @for_all
 def test_a_schemes_lag_is_the_one_that_keeps_energy_in_free_flight(scheme, model, contact):
     """At steps so coarse that kinetic + m g z alone would change by a third."""
-    scene = rough(contact, damping=0)
+    scene = rough(contact, model, damping=0)
     free = dataclasses.replace(scene, duration=0.8)
     kept = keep(free, model=model, scheme=scheme, steps=4)
     assert kept.bounce_count == 0
@@ -94,12 +96,12 @@ def test_a_schemes_lag_is_the_one_that_keeps_energy_in_free_flight(scheme, model
     assert kept.end_energy == pytest.approx(kept.launch_energy, abs=1e-13)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", LANDING)
 @pytest.mark.parametrize("contact", LAWS)
 @pytest.mark.parametrize("steps", [300, 3_000, 100_000])
 def test_symplectic_eulers_defect_is_all_in_the_springs(model, contact, steps):
     """The works of all forces are the change of the kinetic energy, in each bounce: none is missing or wrong."""
-    kept = keep(rough(contact), model=model, scheme=EULER, steps=steps)
+    kept = keep(rough(contact, model), model=model, scheme=EULER, steps=steps)
     for works in (kept.run, kept.flights, kept.bounces.works):
         np.testing.assert_allclose(works.kick_defect, 0, rtol=0, atol=1e-10)
         np.testing.assert_allclose(works.gravity_defect, 0, rtol=0, atol=1e-10)
@@ -117,7 +119,7 @@ def test_the_first_step_of_a_throw_is_booked_with_its_spin(node_velocity):
 
 
 @pytest.mark.parametrize("preset", ["as_listed", "as_written"])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", LANDING)
 def test_a_million_steps_close_to_the_last_digits(preset, model):
     kept = keep(paper(preset), model=model, steps=1_000_000)
     assert kept.run.energy_change == pytest.approx(kept.end_energy - kept.launch_energy, abs=2e-14)  # of 54 J
@@ -136,7 +138,7 @@ def test_long_bounces_close_to_the_last_digits():
 
 @for_all
 def test_without_losses_the_schemes_share_is_all(scheme, model, contact):
-    scene = rough(contact, damping=0, friction=0)
+    scene = rough(contact, model, damping=0, friction=0)
     kept = keep(scene, model=model, scheme=scheme, steps=3_000)
     for works in (kept.run, kept.flights, kept.bounces.works):
         for loss in (works.damping_work, works.drag_work, works.friction_work):
@@ -147,7 +149,7 @@ def test_without_losses_the_schemes_share_is_all(scheme, model, contact):
     assert abs(kept.run.scheme_work) > 1e-3
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", LANDING)
 @pytest.mark.parametrize("n", [2, 3, 4, 7])
 @pytest.mark.parametrize("phase", [0.03, 0.4, 0.77])
 def test_at_a_magic_step_the_scheme_makes_nothing_of_a_bounce(model, n, phase):
@@ -177,9 +179,9 @@ def test_four_fifths_of_the_loss_as_listed_is_drag():
     assert kept.flights.drag_work == pytest.approx(kept.flights.energy_change, rel=1e-9)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", LANDING)
 def test_a_gated_ground_does_nothing_to_a_flight(model):
-    kept = keep(rough("gated"), model=model, steps=20_000)
+    kept = keep(rough("gated", model), model=model, steps=20_000)
     assert kept.run.drag_work == 0
     assert kept.flights.damping_work == kept.flights.friction_work == 0
     assert kept.flights.energy_change == pytest.approx(0, abs=1e-11)
@@ -187,11 +189,14 @@ def test_a_gated_ground_does_nothing_to_a_flight(model):
 
 @for_all
 def test_at_fine_steps_damping_and_friction_only_take(scheme, model, contact):
-    kept = keep(rough(contact), model=model, scheme=scheme, steps=100_000)
+    kept = keep(rough(contact, model), model=model, scheme=scheme, steps=100_000)
     for loss in ("damping_work", "drag_work", "friction_work"):
         assert (getattr(kept.bounces.works, loss) <= 0).all(), loss
     assert kept.run.damping_work < -0.1
-    assert kept.run.friction_work < -1
+    if model == "vertical":
+        assert kept.run.friction_work == 0
+    else:
+        assert kept.run.friction_work < -1
 
 
 def test_coarse_steps_let_friction_overshoot_and_give():
@@ -247,9 +252,9 @@ def test_damping_takes_what_a_cut_pull_leaves_of_the_springs():
     assert kept.run.energy_change == pytest.approx(kept.run.damping_work + kept.run.spring_defect, rel=1e-10)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", LANDING)
 def test_a_bounce_lasts_from_the_last_step_in_the_air_to_the_next(model):
-    scene = rough("gated")
+    scene = rough("gated", model)
     kept = keep(scene, model=model, steps=2_000)
     states = simulate(scene, model=model, steps=2_000, every=1).trajectory.state
     low = clearance_of(scene, states)

@@ -182,7 +182,7 @@ def test_steps_are_a_whole_number(steps):
 @pytest.mark.parametrize(
     ("keys", "told"),
     [
-        ({"model": "falling"}, "model = falling: allowed is sliding or tumbling"),
+        ({"model": "falling"}, "model = falling: allowed is vertical or sliding or tumbling or flying or auto"),
         ({"scheme": "magic"}, "scheme = magic: allowed is symplectic_euler"),
         ({"every": 0}, "every = 0"),
         ({"every": 101}, "every = 101: allowed is a whole number from 1 to 100"),

@@ -264,7 +264,9 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         (f"{SWEEP}.contact", ["sticky"], f"{SWEEP}.contact.0 = sticky: allowed is ungated or gated"),
         (f"{SWEEP}.contact", [], f"{SWEEP}.contact = []"),
         (f"{SWEEP}.contact", "gated", f"{SWEEP}.contact = gated: allowed is a list of different contact laws"),
-        (f"{SWEEP}.model", "falling", f"{SWEEP}.model = falling: allowed is sliding or tumbling"),
+        (f"{SWEEP}.model", "falling", f"{SWEEP}.model = falling: allowed is vertical or sliding or"),
+        (f"{SWEEP}.model", "flying", f"{SWEEP}: model = flying: allowed for scenes in which the ground never acts"),
+        ("runs.figure-04.model", "flying", "runs.figure-04: model = flying: allowed for scenes"),
         (f"{SWEEP}.scene", "nowhere.yaml", "nowhere.yaml: No such file"),
         (f"{SWEEP}.set", ["ground.S=1"], "ground.S"),
         (f"{SWEEP}.set", ["ground.stiffness=3"], "the sweep sets this itself, from its key stiffness"),
@@ -398,11 +400,42 @@ def test_what_a_drawing_shows_can_be_had():
         assert (entry.measures in catalogue.EXPERIMENTS) == (entry.given == "experiments")
 
 
+DROPPED = "launch.velocity=[0, 0, 5]"
+
+
+def test_auto_is_resolved_from_the_sweeps_scene(sweep_of):
+    asked = sweep_of()
+    assert asked.model_reason == "as asked"
+    slid = sweep_of(model="auto", set=["ground.friction=0"])
+    assert (slid.model, slid.model_reason[:9]) == ("sliding", "sliding: ")
+    dropped = sweep_of(model="auto", set=[DROPPED])
+    assert dropped.model == "vertical"
+    assert dropped.criteria == asked.criteria
+    thrown = sweep_of(model="auto", criteria={"energy": 0.1, "apex": 0.1})
+    assert (thrown.model, list(thrown.criteria)) == ("tumbling", ["energy"])
+    # The reason is in the file, so that a file made for another is made anew.
+    assert names(dropped).isdisjoint(names(sweep_of(model="vertical", set=[DROPPED])))
+
+
+def test_auto_is_exact_in_every_column_of_a_sweep(sweep_of):
+    """Soft ground lets the cube sink past its centre; and the law of the listings drags where nothing else acts."""
+    soft = sweep_of(model="auto", set=[DROPPED], stiffness={"from": 10, "to": 1e4, "count": 3})
+    assert soft.model == "tumbling"
+    short = [DROPPED, "duration=1"]
+    assert sweep_of(model="auto", set=short, contact=["gated"]).model == "flying"
+    assert sweep_of(model="auto", set=short).model == "vertical"
+
+
+def test_auto_is_resolved_for_each_reading_of_a_run(changed):
+    planned = changed({"runs.figure-09.model": "auto", "figures.energy.draw": "cube-start"})
+    assert planned.runs["figure-09"].model == "auto"  # as listed and as written may require different ones
+
+
 def test_the_schema_knows_what_the_code_knows(study_schema):
     """What it enumerates; drawings, tables, experiments and criteria are looked up when a study is read."""
     schema = yaml.safe_load(study_schema.read_text())
     kinds = schema["$defs"]
-    assert kinds["model"]["enum"] == list(MODELS)
+    assert kinds["model"]["enum"] == [*MODELS, "auto"]
     assert kinds["scheme"]["enum"] == list(SCHEMES)
     assert kinds["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
     text = study_schema.read_text()

@@ -88,6 +88,7 @@ def test_every_cell_says_where_it_is_and_everything_what_it_is(tmp_path):
             assert variable.attrs["units"], name
             assert variable.attrs["long_name"], name
         assert found.attrs["early_stop"] == 0
+        assert found.attrs["model_reason"] == "as asked"
 
 
 @pytest.mark.parametrize("early_stop", [False, True])

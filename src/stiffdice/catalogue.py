@@ -41,6 +41,7 @@ DRAWINGS: dict[str, Entry] = {
     "ledger": Entry(f"{_FIGURES}.ledger", "draw", "experiments", "ledger"),
     "atlas": Entry(f"{_FIGURES}.atlas", "draw", "experiments", "extremes"),
     "chatter": Entry(f"{_FIGURES}.chatter", "draw", "experiments", "chatter"),
+    "pieces": Entry(f"{_FIGURES}.pieces", "draw", "experiments", "pieces"),
 }
 
 # (datasets by name, title) -> a table.
@@ -57,4 +58,5 @@ EXPERIMENTS: dict[str, Entry] = {
     "extremes": Entry("stiffdice.experiments.extremes", "measure"),
     "chatter": Entry("stiffdice.experiments.chatter", "measure"),
     "precision": Entry("stiffdice.experiments.precision", "measure"),
+    "pieces": Entry("stiffdice.experiments.pieces", "measure"),
 }

@@ -14,6 +14,7 @@ EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-09.yaml --model sliding -o stiff.h5
   stiffdice run my-cube.yaml --steps 1e5 --set ground.stiffness=1e6 --set cube.mass=0.02 -o out.h5
+  stiffdice run my-cube.yaml --model auto -o out.h5
   stiffdice inspect stiff.h5
 """
 RUN_EXAMPLES = """\
@@ -64,7 +65,12 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
-    run.add_argument("--model", default="tumbling", metavar="M", help="sliding or tumbling (default: tumbling)")
+    run.add_argument(
+        "--model",
+        default="tumbling",
+        metavar="M",
+        help="vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)",
+    )
     run.add_argument(
         "--scheme",
         default="symplectic_euler",
@@ -151,6 +157,7 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.io.layout import run_dataset
     from stiffdice.io.write import write_dataset
     from stiffdice.progress import Progress
+    from stiffdice.requirement import AUTO
     from stiffdice.simulate import default_every, simulate
     from stiffdice.verdict import Verdict
 
@@ -170,9 +177,11 @@ def _run(options: argparse.Namespace) -> None:
         )
     dataset = run_dataset(run)
     if options.ledger:
-        books = ledger.keep(scene, model=options.model, scheme=options.scheme, steps=steps)
+        books = ledger.keep(scene, model=run.model, scheme=options.scheme, steps=steps)
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
+    if options.model == AUTO:
+        print(run.model_reason)
     print(f"{target}: {Verdict(run.verdict[0]).sentence}")
 
 

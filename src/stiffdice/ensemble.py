@@ -13,7 +13,7 @@ import numpy as np
 
 from stiffdice.errors import InputError
 from stiffdice.scene import Scene
-from stiffdice.state import TURNING, Array, Ensemble, States, rotated, start_of
+from stiffdice.state import TOUCHING, TURNING, Array, Ensemble, States, rotated, start_of
 
 
 def turned(scene: Scene, model: str, count: int) -> States:
@@ -21,10 +21,10 @@ def turned(scene: Scene, model: str, count: int) -> States:
 
     The first is the scene's own. The others are spread evenly, by a sequence without randomness: orientations over all
     rotations (Shoemake, Graphics Gems III, 1992, p. 124), the axis of the spin over all directions, its magnitude kept.
-    A model that does not turn the cube gets copies.
+    A model that does not turn the cube gets copies, and so does one of which the ground never feels how it is turned.
     """
     members = np.repeat(start_of(scene, model), count)
-    if model not in TURNING:
+    if model not in TURNING & TOUCHING:
         return members
     spin = math.hypot(*scene.launch.spin)
     offsets = scene.cube.node_offsets()

@@ -27,6 +27,8 @@ def lost(sight: Any) -> bool:
 @njit
 def _rising(model: Any, speed: float, sight: Any) -> float:
     """Ungated: the force on a node is zero as long as it rises, which is known of all only where none turns."""
+    if not models.touches(model):
+        return math.inf
     if models.turns(model) or speed < 0.0:
         return 0.0
     return speed / (sight.step_size * sight.pull) if sight.pull > 0.0 else math.inf

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffdice import theory
+from stiffdice.requirement import AS_ASKED
 from stiffdice.scene import Scene
 from stiffdice.state import Array
 
@@ -28,6 +29,7 @@ class Sweep:
 
     criteria: tolerances of those asked. early_stop: whether a run ends once all of them are decided. refine: how many
     times the scan is made twice as dense where members disagree. horizon [s]: until when `trajectory` compares.
+    model: the one computed; model_reason: why.
     """
 
     scene: Scene
@@ -44,6 +46,7 @@ class Sweep:
     early_stop: bool
     horizon: float
     columns_per_shard: int
+    model_reason: str = AS_ASKED
 
     def scene_of(self, column: Column) -> Scene:
         """Return the sweep's scene on the ground of a column."""
@@ -109,6 +112,8 @@ class Sweep:
         plan += [dict(self._grid), "steps" if self.omega_h is None else "omega_h"]
         if "trajectory" in self.criteria:
             plan.append(self.horizon)
+        if self.model_reason != AS_ASKED:  # it is stored
+            plan.append(self.model_reason)
         # Other tolerances need other runs only where a run stops, or a scan is refined, because of them.
         if self.early_stop or self.refine:
             plan += [dict(self.criteria), self.early_stop]

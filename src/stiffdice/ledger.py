@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, energy, schemes
+from stiffdice import checks, energy, requirement, schemes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS, height_of, node_force, normal_force, reaches
 from stiffdice.io.enums import enum_attributes
@@ -162,11 +162,12 @@ def keep(
 ) -> Ledger:
     """Run the scene's own launch step by step and return the ledger of its energy.
 
-    Raises InputError for an unknown name or a step count out of range.
+    model: `auto` takes the least that is exact for the scene. Raises InputError for an unknown name, a step count out
+    of range, and a model that the scene does not allow.
     """
-    checks.choice("model", model, MODELS)
     checks.choice("scheme", scheme, BOOKED)
     steps = checks.count("steps", steps)
+    model, _ = requirement.chosen(model, [scene], scene.duration / steps)
     physics = physics_of(scene)
     accounts = np.zeros(3, _ACCOUNT)
     rows = np.zeros(min(LARGEST, steps), _ROW)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, phases, schemes, watch
+from stiffdice import checks, phases, requirement, schemes, watch
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.criteria import MEMORY, limits_of, open_of, tolerances_of, values
@@ -57,16 +57,17 @@ class Trajectory:
 class Run:
     """One run, or an ensemble of them.
 
-    tolerances: of the criteria the run was asked. measures: values by name, shape (member,). steps_done: int64
-    (member,): fewer than `steps` where the run was stopped, all being decided, or left the range of doubles.
-    decided: int64 (member, criterion), the step that decided a criterion, in the registry's order; 0 if none did before
-    the end. steps_computed: int64 (member,), those not taken at once. evaluations: int64 (member,), of the force.
-    tolerance [1]: of the error, for a scheme that controls its own. verdict: int8 (member,), a `Verdict`. end: the last
-    state, shape (member, ...).
+    model: the one computed; model_reason: why, where `auto` was asked. tolerances: of the criteria the run was asked.
+    measures: values by name, shape (member,). steps_done: int64 (member,): fewer than `steps` where the run was
+    stopped, all being decided, or left the range of doubles. decided: int64 (member, criterion), the step that decided
+    a criterion, in the registry's order; 0 if none did before the end. steps_computed: int64 (member,), those not taken
+    at once. evaluations: int64 (member,), of the force. tolerance [1]: of the error, for a scheme that controls its
+    own. verdict: int8 (member,), a `Verdict`. end: the last state, shape (member, ...).
     """
 
     scene: Scene
     model: str
+    model_reason: str
     scheme: str
     steps: int
     tolerance: float
@@ -105,20 +106,24 @@ def simulate(
 ) -> Run:
     """Run the simulator and return what happened.
 
-    tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are then the
-    intervals after which a state is known. every: keep every K-th state, from the launch on. leap: take many steps at
-    once where their motion is known (`flight.py`, `phases.py`), which agrees with stepping to round-off; where no state
-    is kept that is done anyway. members: the launches of an ensemble; None runs the scene's own launch. criteria:
-    tolerances of those that the verdict asks; None asks the default ones. stop: end a run as soon as all of these
-    criteria are decided at these tolerances. references: what `trajectory` compares with, one for all or one for each
-    member (`reference.make`). budget: most steps to compute one by one; a run that needs more ends undecided. progress:
-    called with the fraction done, some times a second.
+    model: `auto` takes the least that is exact for the scene (`requirement.py`). tolerance [1]: of the error, relative
+    to the motion, for a scheme that controls its own; `steps` are then the intervals after which a state is known.
+    every: keep every K-th state, from the launch on. leap: take many steps at once where their motion is known
+    (`flight.py`, `phases.py`), which agrees with stepping to round-off; where no state is kept that is done anyway.
+    members: the launches of an ensemble; None runs the scene's own launch. criteria: tolerances of those that the
+    verdict asks; None asks the default ones. stop: end a run as soon as all of these criteria are decided at these
+    tolerances. references: what `trajectory` compares with, one for all or one for each member (`reference.make`).
+    budget: most steps to compute one by one; a run that needs more ends undecided. progress: called with the fraction
+    done, some times a second.
 
-    Raises InputError for an unknown name, a step count or K out of range, and a trajectory too large to hold.
+    Raises InputError for an unknown name, a step count or K out of range, a model that the scene does not allow, `auto`
+    for an ensemble, and a trajectory too large to hold.
     """
-    checks.choice("model", model, MODELS)
     checks.choice("scheme", scheme, schemes.SCHEMES)
     steps = checks.count("steps", steps)
+    if model == requirement.AUTO and members is not None:
+        raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
+    model, model_reason = requirement.chosen(model, [scene], scene.duration / steps)
     tolerance = checks.number("tolerance", tolerance, "1", above=0)
     if not schemes.FINEST <= tolerance <= schemes.COARSEST:
         raise InputError(
@@ -181,6 +186,7 @@ def simulate(
     return Run(
         scene,
         model,
+        model_reason,
         scheme,
         steps,
         tolerance,

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.cube import SIGNS
+from stiffdice.errors import InputError
 from stiffdice.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -80,21 +81,39 @@ def physics_of(scene: Scene) -> Physics:
 
 
 # The models that turn the cube; the others leave its spin out.
-TURNING = frozenset({"tumbling"})
+TURNING = frozenset({"tumbling", "flying"})
+# The models in which the ground acts on the cube.
+TOUCHING = frozenset({"vertical", "sliding", "tumbling"})
 
 
 def start_of(scene: Scene, model: str) -> States:
-    """Return the state at the launch, shape (1,); without spin for a model that does not turn the cube."""
+    """Return the state at the launch, shape (1,).
+
+    Without spin for a model that does not turn the cube; for `vertical` without horizontal velocity, too.
+    Raises InputError for `vertical` on ground that is not level.
+    """
     launch = scene.launch
     state = np.zeros(1, STATE)
     state["position"] = launch.position
     state["velocity"] = launch.velocity
+    if model == "vertical":
+        _check_level(scene)
+        state["velocity"][:, :2] = 0.0
     if model in TURNING:
         state["angular_momentum"] = launch.spin
         if launch.node_velocity == "rigid":
             state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
     state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
     return state
+
+
+def _check_level(scene: Scene) -> None:
+    if scene.ground.normal != (0.0, 0.0, 1.0):
+        normal = ", ".join(f"{part:g}" for part in scene.ground.normal)
+        raise InputError(
+            f"model = vertical: ground.normal = [{normal}]; allowed is level ground, [0, 0, 1], as the model moves the "
+            "cube up and down only"
+        )
 
 
 class Ensemble(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import math
 import re
@@ -10,17 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from stiffdice import catalogue, checks
+from stiffdice import catalogue, checks, requirement
 from stiffdice import scene as scenes
 from stiffdice.criteria import tolerances_of
 from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError
 from stiffdice.grid import Sweep
 from stiffdice.io import yaml_file
-from stiffdice.scene import Scene
-from stiffdice.state import TURNING, rotated
+from stiffdice.state import TURNING, start_of
+
+# In units of the side: nodes that are this level land at once, as far as their restitution shows.
+_FLAT = 1e-9
 
 
 class PlannedRun(NamedTuple):
@@ -83,13 +84,14 @@ def load(path: str | Path, schema: str | Path) -> Study:
     _validate(data, schema, str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
+        runs = {name: _planned_run(name, run) for name, run in data.get("runs", {}).items()}
         return Study(
             name=Path(path).stem,
             question=data["question"],
-            runs={name: _planned_run(name, run) for name, run in data.get("runs", {}).items()},
+            runs=runs,
             sweeps={name: _sweep(name, part, data.get("criteria")) for name, part in data.get("sweeps", {}).items()},
             experiments={name: _experiment(name, part) for name, part in data.get("experiments", {}).items()},
-            figures={name: _planned_figure(name, part, data) for name, part in data.get("figures", {}).items()},
+            figures={name: _planned_figure(name, part, data, runs) for name, part in data.get("figures", {}).items()},
             tables={name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()},
             dpi=int(data.get("dpi", 150)),
         )
@@ -150,15 +152,27 @@ def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
     )
     if planned.every > planned.steps:
         raise InputError(f"runs.{name}.every = {planned.every}: allowed is a whole number <= steps = {planned.steps}")
-    for preset in planned.presets:
-        try:
-            scenes.load(planned.scene, preset=preset)
-        except InputError as error:
-            raise error.within(f"runs.{name}") from None
+    try:
+        _models_of(planned)
+    except InputError as error:
+        raise error.within(f"runs.{name}") from None
     return planned
 
 
-def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
+def _models_of(run: PlannedRun) -> set[str]:
+    """Return the models that a run computes, one for each preset; raises InputError if one cannot be started."""
+    models = set()
+    for preset in run.presets:
+        scene = scenes.load(run.scene, preset=preset)
+        model, _ = requirement.chosen(run.model, [scene], scene.duration / run.steps)
+        start_of(scene, model)
+        models.add(model)
+    return models
+
+
+def _planned_figure(
+    name: str, figure: Mapping[str, Any], data: Mapping[str, Any], runs: Mapping[str, PlannedRun]
+) -> PlannedFigure:
     planned = PlannedFigure(figure["draw"], figure.get("run"), tuple(figure.get("of", ())), figure["title"])
     checks.choice(f"figures.{name}.draw", planned.draw, catalogue.DRAWINGS)
     drawing = catalogue.DRAWINGS[planned.draw]
@@ -170,8 +184,8 @@ def _planned_figure(name: str, figure: Mapping[str, Any], data: Mapping[str, Any
         return _checked_sources(f"figures.{name}", planned, drawing, data)
     if planned.of:
         raise InputError(f"figures.{name}.of: {planned.draw} draws a run; name it with `run`")
-    _known(f"figures.{name}.run", planned.run, data.get("runs", {}), "runs")
-    if planned.draw.startswith(("cube", "animation")) and data["runs"][planned.run]["model"] not in TURNING:
+    run = runs[_known(f"figures.{name}.run", planned.run, runs, "runs")]
+    if planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
         raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
     return planned
 
@@ -197,10 +211,12 @@ def _checked_sources(
     return planned
 
 
-def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> None:
-    if name not in names:
+def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> str:
+    """Return a name if there is one such thing in the study; raises InputError otherwise."""
+    if name is None or name not in names:
         allowed = " or ".join(names) or f"none: this study has no {kind}"
         raise InputError(f"{where} = {checks.shown(name)}: allowed is {allowed}")
+    return name
 
 
 def _experiment(name: str, experiment: Mapping[str, Any]) -> Experiment:
@@ -249,7 +265,7 @@ def _sweep(name: str, sweep: Mapping[str, Any], criteria: Mapping[str, float] | 
 def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
     scene = scenes.load(sweep["scene"], sweep.get("set", ()))
     stiffness = sweep["stiffness"]
-    planned = Sweep(
+    asked = Sweep(
         scene,
         sweep["model"],
         sweep.get("scheme", "symplectic_euler"),
@@ -260,11 +276,13 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         int(sweep["members"]),
         int(sweep.get("seed", 0)),
         int(sweep.get("refine", 0)),
-        tolerances_of(sweep["model"], criteria),
+        {},
         bool(sweep.get("early_stop", True)),
         float(sweep.get("horizon", scene.duration)),
         int(sweep.get("columns_per_shard", 4)),
     )
+    model, reason = _model_of(asked)
+    planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))
     if not planned.criteria:
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
     if planned.horizon > scene.duration:
@@ -273,7 +291,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         for override in sweep.get("set", ()):
             if override.split("=")[0].strip() in ("ground", f"ground.{key}"):
                 raise InputError(f"set: {override}: the sweep sets this itself, from its key {key}")
-    if "restitution" in planned.criteria and not _lands_flat(scene):
+    if "restitution" in planned.criteria and not requirement.lands_flat(scene, _FLAT):
         raise InputError("criteria.restitution: is known exactly for flat landings only, and this cube lands tilted")
     most = max(planned.step_range(planned.stiffness[end])[1] for end in ("from", "to"))
     if not most <= checks.LARGEST_COUNT:
@@ -285,8 +303,9 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
     return planned
 
 
-def _lands_flat(scene: Scene) -> bool:
-    """Return whether four nodes of a cube that keeps its orientation meet the ground at once."""
-    offsets = rotated(scene.cube.node_offsets(), np.array(scene.launch.orientation))
-    heights = np.sort(offsets @ np.array(scene.ground.normal))
-    return bool(heights[3] - heights[0] <= 1e-9 * scene.cube.side < heights[4] - heights[0])
+def _model_of(sweep: Sweep) -> tuple[str, str]:
+    """Return the model of a sweep, one for all its columns, and why."""
+    columns = sweep.columns()
+    fewest = min(sweep.step_range(column.stiffness)[0] for column in columns)
+    longest_step = sweep.scene.duration / max(1.0, fewest)
+    return requirement.chosen(sweep.model, map(sweep.scene_of, columns), longest_step)

@@ -158,6 +158,7 @@ def _pattern(sweep: Sweep) -> xr.Dataset:
 
 def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, "stiffdice.sweep")
+    attributes["model_reason"] = sweep.model_reason
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
     attributes["early_stop"] = int(sweep.early_stop)
     if sweep.early_stop:  # otherwise the measures hold for any tolerances

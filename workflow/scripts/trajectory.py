@@ -20,7 +20,7 @@ with logged(snakemake.log[0]) as say:
         run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps, every=planned.every)
         dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
         if planned.scheme in ledger.BOOKED:
-            books = ledger.keep(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps)
+            books = ledger.keep(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
             dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

@@ -24,7 +24,7 @@ from stiffdice.io.enums import enum_attributes
 from stiffdice.models import MODELS
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, simulate
-from stiffdice.state import TURNING, Array, start_of
+from stiffdice.state import TOUCHING, TURNING, Array, start_of
 from stiffdice.verdict import BLOW_UP, Verdict
 
 SCHEME = "symplectic_euler"
@@ -158,8 +158,8 @@ def measure(
     """
     chosen = AXES[checks.choice("axis", axis, AXES)]
     checks.choice("model", model, MODELS)
-    if axis == "spin" and model not in TURNING:
-        raise InputError(f"model = {model}: allowed for axis spin is {' or '.join(TURNING)}")
+    if axis == "spin" and model not in TURNING & TOUCHING:
+        raise InputError(f"model = {model}: allowed for axis spin is {' or '.join(sorted(TURNING & TOUCHING))}")
     if axis == "start" and values:
         raise InputError("values: not for axis start, whose values have names")
     span = [checks.number("values", value, chosen.units) for value in values] or list(chosen.values)

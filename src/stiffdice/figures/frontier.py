@@ -18,7 +18,12 @@ from stiffdice.figures import style
 from stiffdice.frontier import EDGES, FIT, band
 from stiffdice.io.enums import meanings_of
 
-_MODELS = {"sliding": "a cube that slides", "tumbling": "a cube that tumbles"}
+_MODELS = {
+    "vertical": "a cube that falls straight",
+    "sliding": "a cube that slides",
+    "tumbling": "a cube that tumbles",
+    "flying": "a cube in flight",
+}
 
 
 def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:

@@ -90,7 +90,7 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, cod
 
 
 def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
-    """Return one run with its trajectory as a dataset; dimensions time, axis and, for tumbling, node."""
+    """Return one run with its trajectory as a dataset; dimensions time, axis and, of a cube that turns, node."""
     trajectory = run.trajectory
     if trajectory is None or len(run.verdict) != 1:
         raise ValueError("a run's file holds the trajectory of one member")
@@ -111,6 +111,7 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     variables["steps_done"] = ((), run.steps_done[0], STEPS_DONE_ATTRIBUTES)
     variables["evaluations"] = ((), run.evaluations[0], EVALUATIONS_ATTRIBUTES)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, "stiffdice.simulate") | {
+        "model_reason": run.model_reason,
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,
         "step_size_units": "s",

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from stiffdice.compiled import by_tag
-from stiffdice.models import sliding, tumbling
+from stiffdice.models import flying, sliding, tumbling, vertical
 
 _MODULES: dict[str, Any] = {
+    "vertical": vertical,
     "sliding": sliding,
     "tumbling": tumbling,
+    "flying": flying,
 }
 
 MODELS = {name: module.TAG for name, module in _MODULES.items()}
@@ -34,6 +36,9 @@ turn = by_tag({type(module.TAG): module.turn for module in _MODULES.values()})
 
 # (model) -> whether the body turns.
 turns = by_tag({type(module.TAG): module.turns for module in _MODULES.values()})
+
+# (model) -> whether the ground can act on the body.
+touches = by_tag({type(module.TAG): module.touches for module in _MODULES.values()})
 
 # (model, physics, state) -> how far below the centre a node can be in a free flight from this state on [m].
 extent = by_tag({type(module.TAG): module.extent for module in _MODULES.values()})

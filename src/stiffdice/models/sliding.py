@@ -76,6 +76,12 @@ def turns() -> bool:
 
 
 @njit
+def touches() -> bool:
+    """Return that the ground can act on the body."""
+    return True
+
+
+@njit
 def extent(physics: Physics, state: Any) -> float:
     """Return how far below the centre the lowest node is, in a free flight, too [m]."""
     return lowest_of(physics, state)

@@ -1,4 +1,8 @@
-"""`tumbling`: translation and rotation of a rigid cube, the paper's real_throw_cube.m."""
+"""`tumbling`: translation and rotation of a rigid cube, the paper's real_throw_cube.m.
+
+A cube's inertia is the same about every axis, so that the spin is L/I however the cube is turned: no tensor turns with
+it (paper, section 2.1).
+"""
 
 from __future__ import annotations
 
@@ -101,6 +105,12 @@ def _spin(physics: Physics, state: Any) -> tuple[float, float, float]:
 @njit
 def turns() -> bool:
     """Return that the body turns."""
+    return True
+
+
+@njit
+def touches() -> bool:
+    """Return that the ground can act on the body."""
     return True
 
 
