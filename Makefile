@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install paper stability extremes study report test lint types check lock clean
+.PHONY: help install paper stability extremes tradeoff study report test lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -27,6 +27,9 @@ stability: $(READY)  ## measure what "stable" means, into results/stability/
 
 extremes: $(READY)  ## where and how runs fail at the extremes, into results/extremes/
 	@$(BIN)/python workflow/run.py --cores $(CORES) extremes
+
+tradeoff: $(READY)  ## what accuracy costs by scheme, into results/tradeoff/
+	@$(BIN)/python workflow/run.py --cores $(CORES) tradeoff
 
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'

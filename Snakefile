@@ -1,8 +1,9 @@
-# stiffdice: config -> scenes -> runs -> shards -> sweep -> frontier -> figures; and experiments -> figures.
+# stiffdice: config -> scenes -> runs -> shards -> sweep -> frontier -> figures; experiments and timings -> figures.
 #
 #   snakemake paper                       everything the paper shows
 #   snakemake stability                   what "stable" means, measured
 #   snakemake extremes                    where and how runs fail at the extremes
+#   snakemake tradeoff                    what accuracy costs, by scheme
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -36,6 +37,11 @@ rule stability:
 rule extremes:
     input:
         lambda wildcards: everything_of("extremes"),
+
+
+rule tradeoff:
+    input:
+        lambda wildcards: everything_of("tradeoff"),
 
 
 rule study:

@@ -12,7 +12,7 @@ import matplotlib as mpl
 import pytest
 import yaml
 
-from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES
+from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.cli import main
 from stiffdice.criteria import CRITERIA
 from stiffdice.scene import PRESETS, Scene
@@ -68,16 +68,20 @@ def test_the_table_of_study_keys_has_every_key():
     schema = yaml.safe_load((ROOT / "workflow/schemas/study.schema.yaml").read_text())
     told = " ".join(row[0] for row in table_keys("config/README.md", "Study"))
     parts = schema["properties"]
-    keys = [*parts, *schema["$defs"]["sweep"]["properties"], *schema["$defs"]["run"]["properties"], *CRITERIA]
-    for name in ("experiments", "figures", "tables"):
+    kinds = schema["$defs"]
+    keys = [*parts, *CRITERIA]
+    for name in ("sweep", "run", "experiment"):
+        keys += [*kinds[name]["properties"]]
+    for name in ("figures", "tables"):
         keys += [*parts[name]["additionalProperties"]["properties"]]
     for key in keys:
         assert re.search(rf"[`.]{key}[`.]", told), key
 
 
-def test_every_option_of_an_experiment_is_explained():
-    text = (ROOT / "config/README.md").read_text()
-    for name, entry in EXPERIMENTS.items():
+@pytest.mark.parametrize(("heading", "registry"), [("`measure`", EXPERIMENTS), ("`measure` of a timing", TIMINGS)])
+def test_every_option_of_an_experiment_and_of_a_timing_is_explained(heading, registry):
+    text = (ROOT / "config/README.md").read_text().partition(f"| {heading} | what |")[2].partition("\n\n")[0]
+    for name, entry in registry.items():
         (row,) = (line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         for option, part in inspect.signature(entry.load()).parameters.items():
             assert part.kind is not part.KEYWORD_ONLY or f"`{option}`" in row, (name, option)
@@ -85,7 +89,7 @@ def test_every_option_of_an_experiment_is_explained():
 
 def test_every_drawing_is_named():
     text = (ROOT / "config/README.md").read_text()
-    assert all(f"`{name}`" in text for name in [*DRAWINGS, *TABLES, *EXPERIMENTS])
+    assert all(f"`{name}`" in text for name in [*DRAWINGS, *TABLES, *EXPERIMENTS, *TIMINGS])
 
 
 def test_every_scheme_is_explained(capsys):

@@ -33,29 +33,31 @@ def digest_of(copy, module):
 
 SIMULATION = {"stiffdice.simulate", "stiffdice.sweep", "stiffdice.io.layout"}
 DRAWING = {"stiffdice.figures.cube"}
+COMPARING = {"stiffdice.experiments.work_precision"}
 
 
 @pytest.mark.parametrize(
     ("changed", "touches"),
     [
-        ("contact.py", SIMULATION),
-        ("models/tumbling.py", SIMULATION),
-        ("criteria/apex.py", SIMULATION),
-        ("flight.py", SIMULATION),
+        ("contact.py", SIMULATION | COMPARING),
+        ("models/tumbling.py", SIMULATION | COMPARING),
+        ("criteria/apex.py", SIMULATION | COMPARING),
+        ("flight.py", SIMULATION | COMPARING),
         ("fine.py", {"stiffdice.sweep"}),
         ("io/spool.py", {"stiffdice.sweep"}),
+        ("peers/scipy_ivp.py", COMPARING),
         ("figures/style.py", DRAWING),
         ("figures/cube.py", DRAWING),
         ("figures/frontier.py", set()),
         ("cli.py", set()),
-        ("__init__.py", SIMULATION | DRAWING),
+        ("__init__.py", SIMULATION | DRAWING | COMPARING),
     ],
 )
 def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
-    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING}
+    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING}
     with (copy / changed).open("a") as file:
         file.write("\n# changed\n")
-    after = {module: digest_of(copy, module) for module in SIMULATION | DRAWING}
+    after = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING}
     assert {module for module in before if before[module] != after[module]} == touches
 
 

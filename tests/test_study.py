@@ -330,6 +330,7 @@ ROCKING = {"measure": "rocking", "scene": SCENE}
         ({"options": {"stepz": 3}}, "options.stepz: unknown key; allowed are"),
         ({"options": {"steps": "many"}}, "options.steps = many: allowed is a whole number"),
         ({"options": {"steps": 0}}, "options.steps = 0: allowed is a whole number from 1"),
+        ({"measure": "work-precision", "options": {"methods": [1]}}, "methods = [1]: allowed is a list of words"),
         ({"options": {"zeta": 0.3}}, "options.zeta = 0.3: allowed is a list of numbers"),
         ({"options": {"zeta": []}}, "options.zeta = []: allowed is a list of numbers"),
         ({"options": {"zeta": [0.1, "x"]}}, "options.zeta = the text 'x': allowed is a finite number >= 0"),
@@ -350,7 +351,7 @@ def test_an_experiment_is_planned_with_its_options(changed):
 
 def test_a_figure_shows_only_experiments_of_its_kind(changed):
     both = {"experiments.rock": ROCKING, "figures.x": {"draw": "rocking", "of": ["rock"], "title": "x"}}
-    assert changed(both).figures["x"] == ("rocking", None, ("rock",), "x")
+    assert changed(both).figures["x"] == ("rocking", None, ("rock",), "x", ())
     both["figures.x"] = {"draw": "ledger", "of": ["rock"], "title": "x"}
     with pytest.raises(InputError, match=r"figures.x.of = rock: ledger shows only experiments that measure ledger"):
         changed(both)
@@ -375,6 +376,7 @@ ENTRIES = {
         ("drawing", catalogue.DRAWINGS),
         ("table", catalogue.TABLES),
         ("experiment", catalogue.EXPERIMENTS),
+        ("timing", catalogue.TIMINGS),
     )
     for name, entry in registry.items()
 }
@@ -384,7 +386,7 @@ ENTRIES = {
 def test_everything_in_the_catalogue_is_there(name):
     """And takes what its registry says: data and a title, or a scene and options, each with a default."""
     parameters = list(inspect.signature(ENTRIES[name].load()).parameters.values())
-    if name.startswith("experiment"):
+    if name.startswith(("experiment", "timing")):
         assert parameters[0].name == "scene"
         options = parameters[1:]
         assert all(part.kind is part.KEYWORD_ONLY for part in options)
@@ -396,8 +398,10 @@ def test_everything_in_the_catalogue_is_there(name):
 
 def test_what_a_drawing_shows_can_be_had():
     for entry in [*catalogue.DRAWINGS.values(), *catalogue.TABLES.values()]:
-        assert entry.given in ("runs", "sweeps", "experiments")
-        assert (entry.measures in catalogue.EXPERIMENTS) == (entry.given == "experiments")
+        assert entry.given in ("runs", "sweeps", "experiments", "timings")
+        assert entry.given != "experiments" or entry.measures in catalogue.EXPERIMENTS
+        assert entry.measures in catalogue.TIMINGS or not (entry.given == "timings" or entry.timed)
+        assert not entry.measures or entry.given in ("experiments", "timings")
 
 
 DROPPED = "launch.velocity=[0, 0, 5]"
@@ -439,7 +443,7 @@ def test_the_schema_knows_what_the_code_knows(study_schema):
     assert kinds["scheme"]["enum"] == list(SCHEMES)
     assert kinds["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
     text = study_schema.read_text()
-    for registry in (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, CRITERIA):
+    for registry in (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, catalogue.TIMINGS, CRITERIA):
         assert not [name for name in registry if f" {name}," in text or f"[{name}" in text]
 
 

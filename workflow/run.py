@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-STAGES = ("trajectory", "experiment", "shard", "collect", "frontier", "table", "figure", "animation")
+STAGES = ("trajectory", "experiment", "timings", "shard", "collect", "frontier", "table", "figure", "animation")
 ROOT = Path(__file__).parent.parent
 
 

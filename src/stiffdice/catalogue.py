@@ -1,4 +1,4 @@
-"""What a study may ask for by name: drawings, tables and experiments. One line registers one.
+"""What a study may ask for by name: drawings, tables, experiments and timings. One line registers one.
 
 They are named by module and function, not imported: reading a study must not wait for a plotting library.
 """
@@ -11,12 +11,17 @@ from typing import Any, NamedTuple
 
 
 class Entry(NamedTuple):
-    """Where a function is, and what it is given: `runs`, `sweeps` or `experiments` (of the kind `measures`)."""
+    """Where a function is, and what it is given.
+
+    given: `runs`, `sweeps`, `experiments` or `timings`; the last two of the kind `measures`. timed: whether it takes
+    timings of that kind besides.
+    """
 
     module: str
     function: str
     given: str = ""
     measures: str = ""
+    timed: bool = False
 
     def load(self) -> Callable[..., Any]:
         """Return the function."""
@@ -42,12 +47,21 @@ DRAWINGS: dict[str, Entry] = {
     "atlas": Entry(f"{_FIGURES}.atlas", "draw", "experiments", "extremes"),
     "chatter": Entry(f"{_FIGURES}.chatter", "draw", "experiments", "chatter"),
     "pieces": Entry(f"{_FIGURES}.pieces", "draw", "experiments", "pieces"),
+    "work-precision": Entry(f"{_FIGURES}.work_precision", "position", "experiments", "work-precision", timed=True),
+    "work-restitution": Entry(f"{_FIGURES}.work_precision", "restitution", "experiments", "work-precision", timed=True),
+    "work-energy": Entry(f"{_FIGURES}.work_precision", "energy", "experiments", "work-precision", timed=True),
+    "cost": Entry(f"{_FIGURES}.cost", "position", "experiments", "work-precision", timed=True),
+    "cost-restitution": Entry(f"{_FIGURES}.cost", "restitution", "experiments", "work-precision", timed=True),
+    "cost-energy": Entry(f"{_FIGURES}.cost", "energy", "experiments", "work-precision", timed=True),
+    "pieces-time": Entry(f"{_FIGURES}.pieces", "draw_times", "timings", "pieces"),
 }
 
 # (datasets by name, title) -> a table.
 TABLES: dict[str, Entry] = {
     "answers": Entry("stiffdice.answers", "table", "sweeps"),
     "precision": Entry("stiffdice.precision", "table", "experiments", "precision"),
+    "tradeoff": Entry("stiffdice.tradeoff", "table", "experiments", "work-precision", timed=True),
+    "targets": Entry("stiffdice.tradeoff", "targets", "experiments", "work-precision", timed=True),
 }
 
 # (scene, **options) -> a dataset; the function's keyword arguments are the options, with their defaults.
@@ -59,4 +73,11 @@ EXPERIMENTS: dict[str, Entry] = {
     "chatter": Entry("stiffdice.experiments.chatter", "measure"),
     "precision": Entry("stiffdice.experiments.precision", "measure"),
     "pieces": Entry("stiffdice.experiments.pieces", "measure"),
+    "work-precision": Entry("stiffdice.experiments.work_precision", "measure"),
+}
+
+# (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.
+TIMINGS: dict[str, Entry] = {
+    "work-precision": Entry("stiffdice.experiments.work_precision_time", "time"),
+    "pieces": Entry("stiffdice.experiments.pieces", "time"),
 }

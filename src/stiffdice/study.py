@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,7 +39,7 @@ class PlannedRun(NamedTuple):
 
 
 class Experiment(NamedTuple):
-    """One question that is no sweep: what to measure (a name of `experiments.EXPERIMENTS`), of which scene, and how."""
+    """One question that is no sweep, or one timing: what to measure (a name in the catalogue), of what scene, how."""
 
     measure: str
     scene: str
@@ -48,12 +48,16 @@ class Experiment(NamedTuple):
 
 
 class PlannedFigure(NamedTuple):
-    """One figure: what to draw (a name of `figures.DRAWINGS`), of which run, or of which sweeps and experiments."""
+    """One figure: what to draw (a name in the catalogue), of which run, or of which sweeps, experiments or timings.
+
+    timings: those shown besides experiments.
+    """
 
     draw: str
     run: str | None
     of: tuple[str, ...]
     title: str
+    timings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,7 @@ class Study:
     runs: Mapping[str, PlannedRun]
     sweeps: Mapping[str, Sweep]
     experiments: Mapping[str, Experiment]
+    timings: Mapping[str, Experiment]
     figures: Mapping[str, PlannedFigure]
     tables: Mapping[str, PlannedFigure]
     dpi: int
@@ -90,13 +95,19 @@ def load(path: str | Path, schema: str | Path) -> Study:
             question=data["question"],
             runs=runs,
             sweeps={name: _sweep(name, part, data.get("criteria")) for name, part in data.get("sweeps", {}).items()},
-            experiments={name: _experiment(name, part) for name, part in data.get("experiments", {}).items()},
+            experiments={name: _experiment("experiments", name, part) for name, part in _given(data, "experiments")},
+            timings={name: _experiment("timings", name, part) for name, part in _given(data, "timings")},
             figures={name: _planned_figure(name, part, data, runs) for name, part in data.get("figures", {}).items()},
             tables={name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()},
             dpi=int(data.get("dpi", 150)),
         )
     except InputError as error:
         raise error.within(str(path)) from None
+
+
+def _given(data: Mapping[str, Any], kind: str) -> Iterable[tuple[str, Any]]:
+    """Return the parts of one kind that a study names."""
+    return data.get(kind, {}).items()
 
 
 def _validate(data: object, schema: str | Path, source: str) -> None:
@@ -173,7 +184,13 @@ def _models_of(run: PlannedRun) -> set[str]:
 def _planned_figure(
     name: str, figure: Mapping[str, Any], data: Mapping[str, Any], runs: Mapping[str, PlannedRun]
 ) -> PlannedFigure:
-    planned = PlannedFigure(figure["draw"], figure.get("run"), tuple(figure.get("of", ())), figure["title"])
+    planned = PlannedFigure(
+        figure["draw"],
+        figure.get("run"),
+        tuple(figure.get("of", ())),
+        figure["title"],
+        tuple(figure.get("timings", ())),
+    )
     checks.choice(f"figures.{name}.draw", planned.draw, catalogue.DRAWINGS)
     drawing = catalogue.DRAWINGS[planned.draw]
     if drawing.given != "runs":
@@ -182,8 +199,10 @@ def _planned_figure(
                 f"figures.{name}.run = {planned.run}: {planned.draw} draws {drawing.given}; name them with `of`"
             )
         return _checked_sources(f"figures.{name}", planned, drawing, data)
-    if planned.of:
-        raise InputError(f"figures.{name}.of: {planned.draw} draws a run; name it with `run`")
+    if planned.of or planned.timings:
+        raise InputError(
+            f"figures.{name}.{'of' if planned.of else 'timings'}: {planned.draw} draws a run; name it with `run`"
+        )
     run = runs[_known(f"figures.{name}.run", planned.run, runs, "runs")]
     if planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
         raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
@@ -191,7 +210,7 @@ def _planned_figure(
 
 
 def _planned_table(name: str, table: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
-    planned = PlannedFigure(table["tell"], None, tuple(table["of"]), table["title"])
+    planned = PlannedFigure(table["tell"], None, tuple(table["of"]), table["title"], tuple(table.get("timings", ())))
     checks.choice(f"tables.{name}.tell", planned.draw, catalogue.TABLES)
     return _checked_sources(f"tables.{name}", planned, catalogue.TABLES[planned.draw], data)
 
@@ -199,15 +218,18 @@ def _planned_table(name: str, table: Mapping[str, Any], data: Mapping[str, Any])
 def _checked_sources(
     where: str, planned: PlannedFigure, entry: catalogue.Entry, data: Mapping[str, Any]
 ) -> PlannedFigure:
-    """Return the plan; raises InputError unless it names sweeps or experiments that the study has."""
+    """Return the plan; raises InputError unless it names sweeps, experiments or timings that the study has."""
     if not planned.of:
         raise InputError(f"{where}.of is missing: {planned.draw} needs the names of {entry.given}")
-    for source in planned.of:
-        _known(f"{where}.of", source, data.get(entry.given, {}), entry.given)
-        if entry.measures and data[entry.given][source]["measure"] != entry.measures:
-            raise InputError(
-                f"{where}.of = {source}: {planned.draw} shows only experiments that measure {entry.measures}"
-            )
+    if planned.timings and not entry.timed:
+        raise InputError(f"{where}.timings: {planned.draw} shows none")
+    for key, kind, names in (("of", entry.given, planned.of), ("timings", "timings", planned.timings)):
+        for source in names:
+            _known(f"{where}.{key}", source, data.get(kind, {}), kind)
+            if entry.measures and data[kind][source]["measure"] != entry.measures:
+                raise InputError(
+                    f"{where}.{key} = {source}: {planned.draw} shows only {kind} that measure {entry.measures}"
+                )
     return planned
 
 
@@ -219,7 +241,8 @@ def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) ->
     return name
 
 
-def _experiment(name: str, experiment: Mapping[str, Any]) -> Experiment:
+def _experiment(kind: str, name: str, experiment: Mapping[str, Any]) -> Experiment:
+    registry = {"experiments": catalogue.EXPERIMENTS, "timings": catalogue.TIMINGS}[kind]
     planned = Experiment(
         experiment["measure"],
         experiment["scene"],
@@ -227,19 +250,19 @@ def _experiment(name: str, experiment: Mapping[str, Any]) -> Experiment:
         dict(experiment.get("options", {})),
     )
     try:
-        checks.choice("measure", planned.measure, catalogue.EXPERIMENTS)
+        checks.choice("measure", planned.measure, registry)
         scenes.load(planned.scene, planned.changes)
-        parameters = inspect.signature(catalogue.EXPERIMENTS[planned.measure].load()).parameters.values()
+        parameters = inspect.signature(registry[planned.measure].load()).parameters.values()
         known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
         checks.known_keys("options", planned.options, known)
         for key, value in planned.options.items():
             _same_kind(f"options.{key}", value, known[key])
     except InputError as error:
-        raise error.within(f"experiments.{name}") from None
+        raise error.within(f"{kind}.{name}") from None
     return planned
 
 
-def _same_kind(key: str, value: object, default: object) -> None:
+def _same_kind(key: str, value: object, default: Any) -> None:
     """Raise InputError unless an option's value is of the kind that its default is."""
     if isinstance(default, str):
         if not isinstance(value, str):
@@ -249,9 +272,11 @@ def _same_kind(key: str, value: object, default: object) -> None:
     elif isinstance(default, float):
         checks.number(key, value, "", at_least=0)
     else:
-        if not isinstance(value, list) or not value:
-            raise InputError(f"{key} = {checks.shown(value)}: allowed is a list of numbers")
-        for part in value:
+        words = isinstance(default, tuple) and isinstance(default[0], str)
+        if not isinstance(value, list) or not value or (words and not all(isinstance(part, str) for part in value)):
+            kind = f"words, as {default[0]}" if words else "numbers"
+            raise InputError(f"{key} = {checks.shown(value)}: allowed is a list of {kind}")
+        for part in [] if words else value:
             checks.number(key, part, "", at_least=0)
 
 

@@ -26,6 +26,8 @@ from stiffdice.scene import load
 from stiffdice.simulate import simulate
 
 ROOT = Path(__file__).parent.parent.parent
+WORK = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml", "set": ["duration=3"]}
+FEW = {"stiffness": [100], "per_decade": 1, "methods": ["symplectic_euler", "scipy_lsoda"]}
 TINY = {
     "question": "Does all of it work?",
     "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10}},
@@ -43,14 +45,19 @@ TINY = {
     },
     "experiments": {
         "books": {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}},
+        "work": {**WORK, "options": {**FEW, "steps": 1e5}},
     },
+    "timings": {"work": {**WORK, "options": {**FEW, "affordable": 0.01, "rounds": 1}}},
     "figures": {
         "position": {"draw": "position", "run": "stiff", "title": "Position"},
         "frontier": {"draw": "frontier", "of": ["steps"], "title": "Frontier"},
         "books": {"draw": "ledger", "of": ["books"], "title": "Books"},
+        "times": {"draw": "work-precision", "of": ["work"], "timings": ["work"], "title": "Times"},
     },
     "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
 }
+# What two rebuilds share: all but times, and the figures that show them.
+DATA = ("runs/*.h5", "sweeps/**/*.h5", "sweeps/**/*.csv", "experiments/*.h5", "tables/*", "figures/[!t]*")
 # What is due when all runs of the sweep are.
 AGAIN = {"shard": 3, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
 pytestmark = pytest.mark.workflow
@@ -144,7 +151,7 @@ def test_all_files_are_there_and_open(finished):
             assert min(image.size) > 300
         assert "<svg" in (top / "figures" / f"{name}.svg").read_text()
     hdf5 = sorted(top.rglob("*.h5"))
-    assert len(hdf5) == 2 + 3 + 2 + 1  # runs, shards, sweep and frontier, experiment
+    assert len(hdf5) == 2 + 3 + 2 + 2 + 1  # runs, shards, sweep and frontier, experiments, timing
     for path in hdf5:
         with xr.open_dataset(path) as found:
             assert found.attrs["format_version"] == FORMAT_VERSION
@@ -196,12 +203,13 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
 
 def test_a_changed_style_redraws_only(finished, edited):
     edited("src/stiffdice/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
-    assert finished.jobs_due() == {"figure": 3}
+    assert finished.jobs_due() == {"figure": 4}
 
 
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     edited("src/stiffdice/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
-    everything = {"shard": 3, "trajectory": 2, "experiment": 1, "collect": 1, "frontier": 1, "figure": 3, "table": 1}
+    runs = {"shard": 3, "trajectory": 2, "experiment": 2, "timing": 1}
+    everything = runs | {"collect": 1, "frontier": 1, "figure": 4, "table": 1}
     assert finished.jobs_due() == everything
 
 
@@ -228,9 +236,10 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
 @pytest.mark.parametrize(
     ("script", "due"),
     [
-        ("figure", {"figure": 3}),
+        ("figure", {"figure": 4}),
         ("table", {"table": 1}),
-        ("experiment", {"experiment": 1, "figure": 1}),
+        ("experiment", {"experiment": 2, "figure": 2}),
+        ("timing", {"timing": 1, "figure": 1}),
         ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
@@ -256,6 +265,12 @@ def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
 def test_a_changed_drawing_draws_its_figure_only(finished, edited):
     edited("src/stiffdice/figures/ledger.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"figure": 1}
+
+
+def test_a_timing_keeps_its_times_where_benchmarks_are(finished):
+    found = open_file(finished.folder / "results/tiny/benchmarks/timings/work.h5")
+    assert (found.seconds.isel(effort=0) > 0).all()
+    assert found.attrs["machine_cores"] >= 1
 
 
 def test_changed_options_make_an_experiment_again(finished, edited):
@@ -336,7 +351,7 @@ def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other.plan({**TINY, "sweeps": {"steps": {**TINY["sweeps"]["steps"], "columns_per_shard": 1}}})
     done = other.snakemake("--cores", "1")
     assert done.returncode == 0, done.stderr
-    data = ("sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "runs/*.h5", "figures/*")
+    data = ("sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "runs/*.h5", "experiments/*", "figures/[!t]*")
     assert other.results(*data) == finished.results(*data)
 
 
@@ -360,8 +375,7 @@ def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
     assert project.jobs_due()
     done = project.snakemake()
     assert done.returncode == 0, done.stderr
-    data = ("**/*.h5", "sweeps/steps/*.csv", "figures/*")
-    assert project.results(*data) == finished.results(*data)
+    assert project.results(*DATA) == finished.results(*DATA)
 
 
 def test_where_the_time_went_is_told(finished):

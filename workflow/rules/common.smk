@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from stiffdice import study as studies
-from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES
+from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.errors import InputError
 from stiffdice.provenance import code_digest
 
@@ -21,6 +21,7 @@ wildcard_constraints:
     shard="[0-9a-f]{12}",
     sweep="[a-z0-9][a-z0-9-]*",
     experiment="[a-z0-9][a-z0-9-]*",
+    timing="[a-z0-9][a-z0-9-]*",
     table="[a-z0-9][a-z0-9-]*",
 
 
@@ -58,6 +59,10 @@ def planned_experiment(wildcards):
     return study(wildcards.study).experiments[wildcards.experiment]
 
 
+def planned_timing(wildcards):
+    return study(wildcards.study).timings[wildcards.timing]
+
+
 def planned_figure(wildcards):
     return study(wildcards.study).figures[wildcards.figure]
 
@@ -78,10 +83,19 @@ def figure_files(name, figure):
     return [f"results/{name}/figures/{figure}.{kind}" for kind in kinds]
 
 
+# Where the files of each kind are. Times are apart, with the other files that no two rebuilds share.
+PLACES = {
+    "sweeps": "sweeps/{}/frontier.h5",
+    "experiments": "experiments/{}.h5",
+    "timings": "benchmarks/timings/{}.h5",
+}
+
+
 def found_by(name, planned, kind):
-    """Return the files of the sweeps or experiments that a figure or a table shows, by their names."""
-    places = {"sweeps": "sweeps/{}/frontier.h5", "experiments": "experiments/{}.h5"}
-    return {source: f"results/{name}/{places[kind].format(source)}" for source in planned.of}
+    """Return the files that a figure or a table shows, by their names; those of timings shown besides are apart."""
+    files = {source: f"results/{name}/{PLACES[kind].format(source)}" for source in planned.of}
+    timings = {f"{source} timed": f"results/{name}/{PLACES['timings'].format(source)}" for source in planned.timings}
+    return files | timings
 
 
 def data_of_figure(wildcards):
@@ -116,6 +130,7 @@ def everything_of(name):
     for sweep in planned.sweeps:
         files += [f"results/{name}/sweeps/{sweep}/{file}" for file in ("sweep.h5", "frontier.h5", "frontier.csv")]
     files += [f"results/{name}/experiments/{experiment}.h5" for experiment in planned.experiments]
+    files += [f"results/{name}/benchmarks/timings/{timing}.h5" for timing in planned.timings]
     files += [f"results/{name}/tables/{table}.{kind}" for table in planned.tables for kind in ("md", "csv")]
     return files
 

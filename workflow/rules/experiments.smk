@@ -1,4 +1,4 @@
-# Questions that are no sweep: one experiment, one file.
+# Questions that are no sweep: one experiment, one file; and how long things take.
 
 
 rule experiment:
@@ -23,3 +23,28 @@ rule experiment:
         "../envs/stiffdice.yaml"
     script:
         "../scripts/experiment.py"
+
+
+# Alone on the machine: it takes every core that the workflow has, though it uses one.
+rule timing:
+    input:
+        scene=lambda wildcards: planned_timing(wildcards).scene,
+    output:
+        "results/{study}/benchmarks/timings/{timing}.h5",
+    params:
+        experiment=lambda wildcards: planned_timing(wildcards),
+        code=lambda wildcards: code_of(
+            "timing.py", TIMINGS[planned_timing(wildcards).measure].module, "stiffdice.io.write"
+        ),
+    log:
+        "results/{study}/logs/timings/{timing}.log",
+    benchmark:
+        "results/{study}/benchmarks/timings/{timing}.tsv"
+    threads: workflow.cores
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/timing.py"
