@@ -18,6 +18,8 @@ from stiffdice.models import MODELS
 from stiffdice.scene import PRESETS
 from stiffdice.schemes import SCHEMES
 
+TOP = Path(__file__).parent.parent
+
 CONFIG = Path(__file__).parent.parent / "config"
 SWEEP = "sweeps.steps-needed"
 SCENE = "config/scenes/figure-13.yaml"
@@ -463,3 +465,19 @@ def test_a_sweeps_ground_is_not_set_by_the_back_door(sweep_of):
 def test_a_criterion_that_is_none_is_told_though_no_sweep_asks_it(changed):
     with pytest.raises(InputError, match=r"criteria\.speed: unknown; allowed are finite, energy"):
         changed({"criteria": {"speed": 1}, "sweeps": None, "figures": None})
+
+
+@pytest.mark.parametrize("kind", ["runs", "sweeps"])
+def test_a_scheme_that_does_not_apply_is_told_when_the_study_is_read(kind, study_schema, tmp_path):
+    data = yaml.safe_load((TOP / "config/quick.yaml").read_text())
+    part = {"scene": str(TOP / "config/scenes/figure-04.yaml"), "model": "tumbling", "scheme": "exact"}
+    if kind == "runs":
+        data["runs"] = {"one": part | {"steps": 10}}
+    else:
+        name = next(iter(data["sweeps"]))
+        data["sweeps"][name] |= part
+        data["sweeps"][name]["criteria"] = {"energy": 0.05}
+    path = tmp_path / "wrong.yaml"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(InputError, match=f"{kind}.*scheme = exact, model = tumbling: allowed is a model that does not"):
+        study.load(path, study_schema)

@@ -163,11 +163,12 @@ def keep(
     """Run the scene's own launch step by step and return the ledger of its energy.
 
     model: `auto` takes the least that is exact for the scene. Raises InputError for an unknown name, a step count out
-    of range, and a model that the scene does not allow.
+    of range, and a model that the scene or the scheme does not allow.
     """
     checks.choice("scheme", scheme, BOOKED)
     steps = checks.count("steps", steps)
     model, _ = requirement.chosen(model, [scene], scene.duration / steps)
+    schemes.check_fit(scheme, scene, model)
     physics = physics_of(scene)
     accounts = np.zeros(3, _ACCOUNT)
     rows = np.zeros(min(LARGEST, steps), _ROW)

@@ -116,14 +116,15 @@ def simulate(
     budget: most steps to compute one by one; a run that needs more ends undecided. progress: called with the fraction
     done, some times a second.
 
-    Raises InputError for an unknown name, a step count or K out of range, a model that the scene does not allow, `auto`
-    for an ensemble, and a trajectory too large to hold.
+    Raises InputError for an unknown name, a step count or K out of range, a model that the scene or the scheme does not
+    allow, `auto` for an ensemble, and a trajectory too large to hold.
     """
     checks.choice("scheme", scheme, schemes.SCHEMES)
     steps = checks.count("steps", steps)
     if model == requirement.AUTO and members is not None:
         raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
     model, model_reason = requirement.chosen(model, [scene], scene.duration / steps)
+    schemes.check_fit(scheme, scene, model)
     tolerance = checks.number("tolerance", tolerance, "1", above=0)
     if not schemes.FINEST <= tolerance <= schemes.COARSEST:
         raise InputError(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiffdice import catalogue, checks, requirement
+from stiffdice import catalogue, checks, requirement, schemes
 from stiffdice import scene as scenes
 from stiffdice.criteria import tolerances_of
 from stiffdice.ensemble import phased, turned
@@ -176,6 +176,7 @@ def _models_of(run: PlannedRun) -> set[str]:
     for preset in run.presets:
         scene = scenes.load(run.scene, preset=preset)
         model, _ = requirement.chosen(run.model, [scene], scene.duration / run.steps)
+        schemes.check_fit(run.scheme, scene, model)
         start_of(scene, model)
         models.add(model)
     return models
@@ -308,6 +309,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
     )
     model, reason = _model_of(asked)
     planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))
+    schemes.check_fit(planned.scheme, scene, model)
     if not planned.criteria:
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
     if planned.horizon > scene.duration:

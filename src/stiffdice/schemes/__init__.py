@@ -1,7 +1,8 @@
 """Time-stepping schemes. A scheme is a module with TAG, LAG, `step` and `flight`; one line registers it.
 
 It may also have a `swing`, and say that what `phases.py` takes at once is `proven` for it; otherwise those of
-`closed.py` stand for it, and its contacts are stepped.
+`closed.py` stand for it, and its contacts are stepped. One that does not apply to every scene and model also has
+`unfit(scene, model)`, which says why not.
 """
 
 from __future__ import annotations
@@ -10,7 +11,18 @@ from collections.abc import Callable
 from typing import Any
 
 from stiffdice.compiled import by_tag
-from stiffdice.schemes import closed, event, forward_euler, implicit_euler, rk4, symplectic_euler, velocity_verlet
+from stiffdice.errors import InputError
+from stiffdice.scene import Scene
+from stiffdice.schemes import (
+    closed,
+    event,
+    exact,
+    forward_euler,
+    implicit_euler,
+    rk4,
+    symplectic_euler,
+    velocity_verlet,
+)
 
 _MODULES: dict[str, Any] = {
     "symplectic_euler": symplectic_euler,
@@ -18,6 +30,7 @@ _MODULES: dict[str, Any] = {
     "velocity_verlet": velocity_verlet,
     "rk4": rk4,
     "implicit_euler": implicit_euler,
+    "exact": exact,
     "event": event,
 }
 
@@ -29,8 +42,8 @@ def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:
     return by_tag({type(module.TAG): getattr(module, part, *otherwise) for module in _MODULES.values()})
 
 
-# (scheme, model, law, physics, state, h, tolerance) -> force evaluations: advance `state` by one step of h [s]. Only a
-# scheme that controls its own error looks at the tolerance [1] of it.
+# (scheme, model, law, physics, state, h, tolerance) -> force evaluations, or pieces in closed form: advance `state` by
+# one step of h [s]. Only a scheme that controls its own error looks at the tolerance [1] of it.
 step = _chosen("step")
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
@@ -53,3 +66,17 @@ OWN_STEPS = frozenset(name for name, module in _MODULES.items() if getattr(modul
 
 # By how many steps a scheme's velocity is behind its place: in free flight the path's slope is u + LAG·(u − u_before).
 LAGS: dict[str, float] = {name: module.LAG for name, module in _MODULES.items()}
+
+
+def unfit(scheme: str, scene: Scene, model: str) -> str | None:
+    """Return in one sentence why a scheme does not apply to a scene and model, or None if it does."""
+    module = _MODULES[scheme]
+    why: str | None = module.unfit(scene, model) if hasattr(module, "unfit") else None
+    return why
+
+
+def check_fit(scheme: str, scene: Scene, model: str) -> None:
+    """Raise InputError where a scheme does not apply to a scene and model."""
+    why = unfit(scheme, scene, model)
+    if why is not None:
+        raise InputError(why)
