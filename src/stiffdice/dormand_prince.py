@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
-from stiffdice.regime import derivative
+from stiffdice.regime import SIZE, derivative
 from stiffdice.state import Physics
 
 STAGES = 12
@@ -141,47 +141,50 @@ def step(
     stages: Any,
     end: Any,
 ) -> None:
-    """Set `end` to the motion `start` after h [s] in a regime; stages: shape (13, size), the first is start's rate.
+    """Set `end` to the motion `start` after h [s] in a regime; stages: shape (13, SIZE), the first is start's rate.
 
     Evaluates 11 derivatives; row 12 of `stages` is left for the end's.
     """
-    size = start.shape[0]
     for stage in range(1, STAGES):
-        _combine(COUPLING[stage], stage, stages, start, h, size, end)
+        _combine(COUPLING[stage], stage, stages, start, h, end)
         derivative(turning, physics, nodes, regime, end, stages[stage])
-    _combine(WEIGHTS, STAGES, stages, start, h, size, end)
+    _combine(WEIGHTS, STAGES, stages, start, h, end)
 
 
 @njit
-def _combine(weights: Any, count: int, stages: Any, start: Any, h: float, size: int, end: Any) -> None:
-    for part in range(size):
+def _combine(weights: Any, count: int, stages: Any, start: Any, h: float, end: Any) -> None:
+    for part in range(SIZE):
         end[part] = 0.0
     for stage in range(count):
         weight = weights[stage]
         if weight != 0.0:
-            for part in range(size):
+            for part in range(SIZE):
                 end[part] += weight * stages[stage, part]
-    for part in range(size):
+    for part in range(SIZE):
         end[part] = start[part] + h * end[part]
 
 
 @njit
-def error(stages: Any, scale: Any, h: float) -> float:
+def error(stages: Any, scale: Any, h: float, sums: Any) -> float:
     """Return the estimated error of the step over what is tolerated, `scale` of each part of the motion.
 
     As in DOP853, the fifth-order estimate reined in by the third-order one: err5²/√(err5² + err3²/100).
+    sums: scratch, shape (2, SIZE).
     """
-    size = scale.shape[0]
-    fifth = third = 0.0
-    for part in range(size):
-        five = three = 0.0
-        for stage in range(STAGES):
-            five += ERROR_5[stage] * stages[stage, part]
-            three += ERROR_3[stage] * stages[stage, part]
-        fifth = max(fifth, abs(h * five) / scale[part])
-        third = max(third, abs(h * three) / scale[part])
-        if not math.isfinite(five):
-            return math.inf
+    for part in range(SIZE):
+        sums[0, part] = sums[1, part] = 0.0
+    for stage in range(STAGES):
+        five, three = ERROR_5[stage], ERROR_3[stage]
+        for part in range(SIZE):
+            sums[0, part] += five * stages[stage, part]
+            sums[1, part] += three * stages[stage, part]
+    fifth = third = total = 0.0
+    for part in range(SIZE):
+        fifth = max(fifth, abs(h * sums[0, part]) / scale[part])
+        third = max(third, abs(h * sums[1, part]) / scale[part])
+        total += sums[0, part]
+    if not math.isfinite(total):
+        return math.inf
     if fifth == 0.0:
         return 0.0
     return fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
-from stiffdice.regime import derivative, slopes
+from stiffdice.regime import SIZE, derivative, slopes
 from stiffdice.state import Physics
 
 COLUMNS = 7
@@ -42,23 +42,22 @@ def step(
 ) -> float:
     """Set `end` to the motion `start` after h [s] in a regime; return the estimated error over what is tolerated.
 
-    rate: start's derivative. table: scratch, shape (COLUMNS, size). scale: what is tolerated of each part.
+    rate: start's derivative. table: scratch, shape (COLUMNS, SIZE). scale: what is tolerated of each part.
     """
-    size = start.shape[0]
-    by_speed, by_place, factors, moving = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty(size)
+    by_speed, by_place, factors, moving = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, 6)), np.empty(SIZE)
     unknowns = 6 if turning else 3
     slopes(turning, physics, nodes, regime, start, by_speed, by_place)
     for row in range(COLUMNS):
         count = row + 1
         _factorise(by_speed, by_place, h / count, unknowns, factors)
         # Changes are kept apart from where they start, or extrapolation would blow up the latter's round-off.
-        for part in range(size):
+        for part in range(SIZE):
             table[row, part], end[part], moving[part] = 0.0, start[part], rate[part]
         for base in range(count):
             if base > 0:
                 derivative(turning, physics, nodes, regime, end, moving)
             _base_step(turning, physics, end, moving, h / count, by_place, factors, unknowns)
-            for part in range(size):
+            for part in range(SIZE):
                 table[row, part] += moving[part]
                 end[part] = start[part] + table[row, part]
     return _extrapolate(table, start, end, scale)
@@ -109,8 +108,8 @@ def _base_step(
 @njit
 def _extrapolate(table: Any, start: Any, end: Any, scale: Any) -> float:
     """Set `end` to the limit of no step size at all, and return the change by the last column over the scale."""
-    size, error = end.shape[0], 0.0
-    for part in range(size):
+    error = 0.0
+    for part in range(SIZE):
         for column in range(1, COLUMNS):
             for row in range(COLUMNS - 1, column - 1, -1):
                 change = (table[row, part] - table[row - 1, part]) * ((row + 1 - column) / column)

@@ -6,7 +6,7 @@ meets a jump or a kink. Events are the zeros of the switches, two for each node:
 contact law would give it, S d − D u, before the law cuts it off at zero.
 
 The motion is a vector: position [m], velocity [m/s], angular momentum [kg m²/s], and the quaternion (scalar first) that
-turned the nodes since the vector was made. A body that does not turn has only the first six.
+turned the nodes since the vector was made; of a body that does not turn the last two stay as they are.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from stiffdice.compiled import by_tag, njit
 from stiffdice.contact import Gated, Ungated
 from stiffdice.state import Physics
 
-SIZE = 13
-SIZE_WITHOUT_SPIN = 6
+# Parts of a motion, 13, and as many more as make it whole vectors of the processor.
+SIZE = 16
 
 # What a regime says of a node, as bits.
 BELOW = 1
@@ -49,10 +49,9 @@ drags = by_tag({Ungated: _dragged, Gated: _left_alone})
 
 
 @njit
-def _turned(motion: Any, nodes: Any, k: int) -> tuple[float, float, float]:
-    """Return node k relative to the centre [m], turned by the motion's quaternion, of whatever norm."""
-    w, x, y, z = motion[9], motion[10], motion[11], motion[12]
-    a, b, c = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+def _turned(motion: Any, sense: float, a: float, b: float, c: float) -> tuple[float, float, float]:
+    """Return a vector turned by the motion's quaternion, of whatever norm, or with sense −1 turned back."""
+    w, x, y, z = motion[9], sense * motion[10], sense * motion[11], sense * motion[12]
     twice = 2.0 / (w * w + x * x + y * y + z * z)
     p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
     return (
@@ -69,8 +68,9 @@ def _node(
     """Return place relative to the centre [m] and velocity [m/s] of node k."""
     if not turning:
         return nodes[k, 0], nodes[k, 1], nodes[k, 2], motion[3], motion[4], motion[5]
-    rx, ry, rz = _turned(motion, nodes, k)
-    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
+    rx, ry, rz = _turned(motion, 1.0, nodes[k, 0], nodes[k, 1], nodes[k, 2])
+    inverse = 1.0 / physics.inertia
+    wx, wy, wz = inverse * motion[6], inverse * motion[7], inverse * motion[8]
     return (
         rx,
         ry,
@@ -139,19 +139,19 @@ def switches(
     Depths in m; forces in N. A switch that nothing hangs on is 1 for ever.
     """
     height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
-    ax, ay, az = rate[3], rate[4], rate[5]
+    centre_speed = physics.nx * motion[3] + physics.ny * motion[4] + physics.nz * motion[5]
+    centre_gain = physics.nx * rate[3] + physics.ny * rate[4] + physics.nz * rate[5]
+    lx, ly, lz, sx, sy, sz, gx, gy, gz = _normals(turning, physics, motion, rate)
     for k in range(NODES):
-        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
-        clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
-        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        a, b, c = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        clearance = height + lx * a + ly * b + lz * c
+        speed = centre_speed + sx * a + sy * b + sz * c
         below = regime[k] & BELOW != 0
         value[2 * k], slope[2 * k] = (-clearance, -speed) if below else (clearance, speed)
         value[2 * k + 1], slope[2 * k + 1] = 1.0, 0.0
         if physics.damping == 0.0 or not (below or dragging):
             continue
-        gain = physics.nx * ax + physics.ny * ay + physics.nz * az
-        if turning:
-            gain += _turning_gain(physics, motion, rate, rx, ry, rz)
+        gain = centre_gain + gx * a + gy * b + gz * c
         push, change = -physics.damping * speed, -physics.damping * gain
         if below:
             push -= physics.stiffness * clearance
@@ -161,16 +161,31 @@ def switches(
 
 
 @njit
-def _turning_gain(physics: Physics, motion: Any, rate: Any, rx: float, ry: float, rz: float) -> float:
-    """Return a node's acceleration along the normal by turning [m/s²]: n·(α × r + ω × (ω × r))."""
-    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
-    bx, by, bz = rate[6] / physics.inertia, rate[7] / physics.inertia, rate[8] / physics.inertia
-    cx, cy, cz = wy * rz - wz * ry, wz * rx - wx * rz, wx * ry - wy * rx
-    return float(
-        physics.nx * (by * rz - bz * ry + wy * cz - wz * cy)
-        + physics.ny * (bz * rx - bx * rz + wz * cx - wx * cz)
-        + physics.nz * (bx * ry - by * rx + wx * cy - wy * cx)
+def _normals(
+    turning: bool, physics: Physics, motion: Any, rate: Any
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return three vectors of which the products with a node, not turned yet, are its level, speed and acceleration.
+
+    They are along the normal n and relative to the centre; turned back, n, n × ω and n × α + (n·ω) ω − ω² n: for
+    n·(ω × r) = (n × ω)·r, and n·(ω × (ω × r)) = (n·ω)(ω·r) − ω² n·r.
+    """
+    nx, ny, nz = physics.nx, physics.ny, physics.nz
+    if not turning:
+        return nx, ny, nz, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    inverse = 1.0 / physics.inertia
+    wx, wy, wz = inverse * motion[6], inverse * motion[7], inverse * motion[8]
+    bx, by, bz = inverse * rate[6], inverse * rate[7], inverse * rate[8]
+    along, square = nx * wx + ny * wy + nz * wz, wx * wx + wy * wy + wz * wz
+    lx, ly, lz = _turned(motion, -1.0, nx, ny, nz)
+    sx, sy, sz = _turned(motion, -1.0, ny * wz - nz * wy, nz * wx - nx * wz, nx * wy - ny * wx)
+    gx, gy, gz = _turned(
+        motion,
+        -1.0,
+        ny * bz - nz * by + along * wx - square * nx,
+        nz * bx - nx * bz + along * wy - square * ny,
+        nx * by - ny * bx + along * wz - square * nz,
     )
+    return lx, ly, lz, sx, sy, sz, gx, gy, gz
 
 
 @njit
@@ -185,10 +200,8 @@ def vanishing(physics: Physics, motion: Any, small: Any) -> None:
 def fastest(physics: Physics, motion: Any) -> float:
     """Return a speed that no node exceeds [m/s]."""
     speed = math.sqrt(motion[3] ** 2 + motion[4] ** 2 + motion[5] ** 2)
-    if motion.shape[0] > SIZE_WITHOUT_SPIN:
-        spin = math.sqrt(motion[6] ** 2 + motion[7] ** 2 + motion[8] ** 2)
-        speed += physics.reach * spin / physics.inertia
-    return speed
+    spin = math.sqrt(motion[6] ** 2 + motion[7] ** 2 + motion[8] ** 2)
+    return speed + physics.reach * spin / physics.inertia
 
 
 @njit
@@ -244,11 +257,9 @@ def take(turning: bool, state: Any, motion: Any) -> None:
     for axis in range(3):
         motion[axis] = state.position[axis]
         motion[3 + axis] = state.velocity[axis]
-    if turning:
-        for axis in range(3):
-            motion[6 + axis] = state.angular_momentum[axis]
-            motion[10 + axis] = 0.0
-        motion[9] = 1.0
+        motion[6 + axis] = state.angular_momentum[axis] if turning else 0.0
+        motion[10 + axis] = 0.0
+    motion[9] = 1.0
 
 
 @njit
@@ -262,15 +273,8 @@ def give(turning: bool, physics: Physics, nodes: Any, motion: Any, state: Any) -
             state.angular_momentum[axis] = motion[6 + axis]
             state.angular_velocity[axis] = motion[6 + axis] / physics.inertia
         for k in range(NODES):
-            state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = _turned(motion, nodes, k)
-
-
-@njit
-def normalise(motion: Any) -> None:
-    """Give the quaternion the norm one."""
-    norm = math.sqrt(motion[9] ** 2 + motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
-    for part in range(9, 13):
-        motion[part] /= norm
+            x, y, z = _turned(motion, 1.0, nodes[k, 0], nodes[k, 1], nodes[k, 2])
+            state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = x, y, z
 
 
 @njit

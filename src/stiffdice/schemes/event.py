@@ -23,7 +23,6 @@ from stiffdice.compiled import njit
 from stiffdice.regime import (
     NODES,
     SIZE,
-    SIZE_WITHOUT_SPIN,
     SWITCHES,
     begin,
     cross,
@@ -33,7 +32,6 @@ from stiffdice.regime import (
     force_free,
     give,
     hardness,
-    normalise,
     passes,
     switches,
     take,
@@ -77,20 +75,26 @@ _CORRECTIONS = 30
 _NEAR = 1e-3
 
 
-class _Work(NamedTuple):
-    """What a contact is computed in: see `_work_of`."""
-
-    nodes: Any
-    bits: Any
-    here: Any
-    there: Any
-    scale: Any
-    stages: Any
-    table: Any
-    hard: Any
-    value: Any
-    slope: Any
-    small: Any
+# What a contact is computed in, one record, which reaches compiled code as a bare pointer (see `state.STATE`). nodes,
+# bits: those of the regime. here, there: the motion at a step's start and end; stages: rates in between. scale: what
+# error is tolerated. sums, table: scratch of the integrators. hard: see `regime.hardness`. value, slope: of the
+# switches at start and end; small: see `regime.vanishing`.
+_WORK = np.dtype(
+    [
+        ("nodes", np.float64, (NODES, 3)),
+        ("bits", np.int8, NODES),
+        ("here", np.float64, SIZE),
+        ("there", np.float64, SIZE),
+        ("scale", np.float64, SIZE),
+        ("stages", np.float64, (dormand_prince.STAGES + 1, SIZE)),
+        ("sums", np.float64, (2, SIZE)),
+        ("table", np.float64, (extrapolation.COLUMNS, SIZE)),
+        ("hard", np.float64, 3),
+        ("value", np.float64, (2, SWITCHES)),
+        ("slope", np.float64, (2, SWITCHES)),
+        ("small", np.float64, 2),
+    ]
+)
 
 
 @njit
@@ -117,30 +121,25 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> No
     closed.flight(model, physics, state, h, steps, LAG)
 
 
-@njit
-def _work_of(turning: bool, state: Any) -> Any:
-    size = SIZE if turning else SIZE_WITHOUT_SPIN
-    return _Work(
-        nodes=state.node_offset.copy(),
-        bits=np.zeros(NODES, np.int8),
-        here=np.zeros(size),
-        there=np.zeros(size),
-        scale=np.zeros(size),
-        stages=np.zeros((dormand_prince.STAGES + 1, size)),
-        table=np.zeros((extrapolation.COLUMNS, size)),
-        hard=np.zeros(3),
-        value=np.zeros((2, SWITCHES)),
-        slope=np.zeros((2, SWITCHES)),
-        small=np.zeros(2),
-    )
-
-
 @njit(cache=True)
 def _contact(
     turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float
 ) -> tuple[float, int]:
     """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations."""
-    work = _work_of(turning, state)
+    # Kept here while it is used: a record does not keep its array alive.
+    room = np.zeros(1, _WORK)
+    return _go_through(turning, dragging, physics, state, most, tolerance, room)
+
+
+@njit
+def _go_through(
+    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, room: Any
+) -> tuple[float, int]:
+    work = room[0]
+    for node in range(NODES):
+        for axis in range(3):
+            work.nodes[node, axis] = state.node_offset[node, axis]
+    work.scale[:] = 1.0
     take(turning, state, work.here)
     vanishing(physics, work.here, work.small)
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
@@ -151,7 +150,7 @@ def _contact(
         if h == 0.0:
             h = _first(physics, work, tolerance)
         pace = min(h, most - time)
-        _tolerate(turning, physics, work, tolerance, pace)
+        _tolerate(physics, work, tolerance, pace)
         error, order, count = _attempt(turning, physics, work, pace)
         evaluations += count + 1
         change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else 5.0
@@ -180,7 +179,7 @@ def _contact(
             idle = idle + 1 if pace == 0.0 else 0
         time = most if pace == most - time else time + pace
         changed = _cross_zeros(turning, dragging, physics, work)
-        _move_on(turning, work)
+        _move_on(work)
         if changed:
             _look_from(turning, dragging, physics, work)
         if not math.isfinite(work.here[2]):
@@ -206,11 +205,9 @@ def _look_to(turning: bool, dragging: bool, physics: Physics, work: Any) -> None
 
 
 @njit
-def _move_on(turning: bool, work: Any) -> None:
+def _move_on(work: Any) -> None:
     """Start from where the step ended."""
-    if turning:
-        normalise(work.there)
-    for part in range(work.here.shape[0]):
+    for part in range(SIZE):
         work.here[part] = work.there[part]
         work.stages[0, part] = work.stages[dormand_prince.STAGES, part]
     for switch in range(SWITCHES):
@@ -219,7 +216,7 @@ def _move_on(turning: bool, work: Any) -> None:
 
 
 @njit
-def _tolerate(turning: bool, physics: Physics, work: Any, tolerance: float, h: float) -> None:
+def _tolerate(physics: Physics, work: Any, tolerance: float, h: float) -> None:
     """Set what error is tolerated of each part of the motion in a step of h [s]."""
     here, scale, hard = work.here, work.scale, work.hard
     vanishing(physics, here, work.small)
@@ -237,11 +234,10 @@ def _tolerate(turning: bool, physics: Physics, work: Any, tolerance: float, h: f
     pace = max(pace, noise * (work.small[0] * hard[0] + 2.0**-49 * speed))
     for axis in range(3):
         scale[axis], scale[3 + axis] = length, pace
-    if turning:
-        for axis in range(3):
-            scale[6 + axis] = pace * physics.inertia / physics.reach
-        for part in range(9, SIZE):
-            scale[part] = length / physics.reach
+    spin, turn = pace * physics.inertia / physics.reach, length / physics.reach
+    for axis in range(3):
+        scale[6 + axis], scale[9 + axis] = spin, turn
+    scale[12] = turn
 
 
 @njit
@@ -269,7 +265,7 @@ def _attempt(turning: bool, physics: Physics, work: Any, h: float) -> tuple[floa
         )
         return error, extrapolation.ORDER, extrapolation.EVALUATIONS
     dormand_prince.step(turning, physics, work.nodes, work.bits, work.here, h, work.stages, work.there)
-    return dormand_prince.error(work.stages, work.scale, h), dormand_prince.ORDER, dormand_prince.STAGES - 1
+    return dormand_prince.error(work.stages, work.scale, h, work.sums), dormand_prince.ORDER, dormand_prince.STAGES - 1
 
 
 @njit
@@ -315,7 +311,7 @@ def _first_zero(work: Any, h: float) -> float:
         if passes(work.bits, switch) or not _falls_to_zero(work, switch):
             continue
         low, high = 0.0, 1.0
-        while high - low > 1e-9:
+        while high - low > 1e-6:
             middle = (low + high) / 2
             if _cubic(work, switch, h, middle) > 0.0:
                 low = middle
@@ -349,14 +345,14 @@ def _locate(turning: bool, dragging: bool, physics: Physics, work: Any, when: fl
 def _shift(turning: bool, physics: Physics, work: Any, h: float) -> None:
     """Move the end of the step by h [s], so short that the classical method of Runge and Kutta is exact."""
     stages, there, trial = work.stages, work.there, work.stages[1]
-    first, weights = dormand_prince.STAGES, (0.5, 0.5, 1.0)
-    for part in range(there.shape[0]):
+    first, weights = dormand_prince.STAGES, (0.5, 1.0, 0.0)
+    for part in range(SIZE):
         trial[part] = there[part] + 0.5 * h * stages[first, part]
     for stage in range(3):
         derivative(turning, physics, work.nodes, work.bits, trial, stages[2 + stage])
-        for part in range(there.shape[0]):
+        for part in range(SIZE):
             trial[part] = there[part] + weights[stage] * h * stages[2 + stage, part]
-    for part in range(there.shape[0]):
+    for part in range(SIZE):
         outer, inner = stages[first, part] + stages[4, part], stages[2, part] + stages[3, part]
         there[part] += h / 6 * (outer + 2 * inner)
 
