@@ -99,12 +99,13 @@ def test_the_error_goes_with_the_tolerance(stiffness, spin):
 
 
 def test_the_cost_does_not_grow_with_the_stiffness():
-    """Evaluations of the force at a tolerance of 1e-6, the median of some throws."""
-    spins = np.random.default_rng(1).uniform(0, 0.75, (15, 3))
-    soft, hard = (
-        np.median([places(throw(stiffness, spin=spin), 1e-6)[1] for spin in spins]) for stiffness in (1e2, 1e12)
+    """Evaluations of the force at a tolerance of 1e-6, the median of some throws; soft ground has fewer landings."""
+    spins = np.random.default_rng(1).uniform(0, 0.75, (20, 3))
+    soft, firm, hard = (
+        np.median([places(throw(stiffness, spin=spin), 1e-6)[1] for spin in spins]) for stiffness in (1e2, 1e6, 1e12)
     )
-    assert hard < 1.6 * soft
+    assert hard < 1.1 * firm
+    assert hard < 2 * soft
     assert hard < 800
 
 
