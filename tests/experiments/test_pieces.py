@@ -122,7 +122,7 @@ def test_times_are_told_apart_from_what_rebuilds_share():
         ({"angular_momentum": (0.0, 0.0, 1.0)}, {}, "launch: allowed"),
         ({}, {"friction": [-1]}, "friction = -1"),
         ({}, {"stiffness": [0]}, "stiffness = 0"),
-        ({}, {"omega_h": 0}, "omega_h = 0"),
+        ({}, {"tolerance": 0}, "tolerance = 0"),
     ],
 )
 def test_what_cannot_be_measured_is_said(changes, options, told):

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice import checks, models, schemes, theory
+from stiffdice import checks, models, schemes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.errors import InputError
@@ -37,8 +37,8 @@ ROLES = ("full", "least")
 
 # Of a run, from the launch to the horizon.
 _SAMPLES = 8000
-# No run takes fewer steps: flights have to be resolved on soft ground, too.
-_FEWEST = 5 * _SAMPLES
+# So many times the tolerance shows what is left of the error at it, and more.
+_COARSER = 100
 
 # By name: meaning and units. Of each approximation, against the full model; of the full model.
 _ERRORS = {
@@ -52,7 +52,10 @@ _OF_FULL = {
     "spin_theory": ("the same by theory, for little friction and damping", "rad s-1"),
     "tilt": ("angle of the cube from upright just before the second landing", "rad"),
     "second_landing": ("time just before the second landing", "s"),
-    "numerical_error": ("distance of the place just before the second landing from that at half as many steps", "m"),
+    "numerical_error": (
+        "distance of the place just before the second landing from that at a hundred times the tolerance",
+        "m",
+    ),
 }
 
 
@@ -254,14 +257,14 @@ def measure(
     stiffness: Sequence[float] = tuple(np.logspace(2, 8, 13)),
     friction: Sequence[float] = (0.0, 0.003, 0.01, 0.03, 0.075, 0.15, 0.3),
     horizon: float = 4.0,
-    omega_h: float = 0.05,
+    tolerance: float = 1e-10,
     parted: float = 0.01,
 ) -> xr.Dataset:
     """Return what leaving out rotation, and friction with it, costs in accuracy, and the work that pieces are.
 
     scene: a cube that lands flat and slides along x; gives cube, launch and damping. stiffness [kg/s²], friction [1]:
-    of its ground. horizon [s]: until when runs are compared. omega_h [1]: of their steps. parted [m]: the distance at
-    which a path counts as another one.
+    of its ground. horizon [s]: until when runs are compared. tolerance [1]: of the scheme `event`, which makes them.
+    parted [m]: the distance at which a path counts as another one.
     Dimensions approximation, contact, friction, stiffness; of the work piece and role. Not-a-number where there is no
     parting, or no second landing, before the horizon.
 
@@ -270,7 +273,7 @@ def measure(
     stiffnesses = [checks.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
     frictions = [checks.number("friction", value, "1", at_least=0) for value in friction]
     horizon = checks.number("horizon", horizon, "s", above=0)
-    omega_h = checks.number("omega_h", omega_h, "1", above=0)
+    tolerance = checks.number("tolerance", tolerance, "1", above=0)
     parted = checks.number("parted", parted, "m", above=0)
     upright = dataclasses.replace(_checked(scene), duration=horizon)
     shape = (len(LAWS), len(frictions), len(stiffnesses))
@@ -279,19 +282,18 @@ def measure(
     for c, law in enumerate(LAWS):
         for s, stiff in enumerate(stiffnesses):
             ground = upright.with_ground(contact=law, stiffness=stiff)
-            steps = _steps(ground, omega_h)
-            frictionless = _run(ground.with_ground(friction=0.0), "sliding", steps)
+            frictionless = _run(ground.with_ground(friction=0.0), "sliding", tolerance)
             for f, mu in enumerate(frictions):
                 rough = ground.with_ground(friction=mu)
-                full = _run(rough, MODEL, steps)
+                full = _run(rough, MODEL, tolerance)
                 landings = _landings(rough, full)
-                for name, value in _told(rough, full, _run(rough, MODEL, steps // 2), landings).items():
+                for name, value in _told(rough, full, _run(rough, MODEL, _COARSER * tolerance), landings).items():
                     of_full[name][c, f, s] = value
-                for a, lesser in enumerate((_run(rough, "sliding", steps), frictionless)):
+                for a, lesser in enumerate((_run(rough, "sliding", tolerance), frictionless)):
                     for name, value in _compared(lesser, full, landings, parted).items():
                         errors[name][a, c, f, s] = value
     return _dataset(scene, stiffnesses, frictions, errors, of_full).assign_attrs(
-        horizon=horizon, horizon_units="s", omega_h=omega_h, parted=parted, parted_units="m"
+        horizon=horizon, horizon_units="s", tolerance=tolerance, parted=parted, parted_units="m"
     )
 
 
@@ -303,15 +305,9 @@ def _checked(scene: Scene) -> Scene:
     return scene
 
 
-def _steps(scene: Scene, omega_h: float) -> int:
-    """Return a number of steps of which half is a multiple of the samples, too."""
-    needed = max(_FEWEST, theory.steps_for(scene, omega_h))
-    return 2 * _SAMPLES * math.ceil(needed / (2 * _SAMPLES))
-
-
-def _run(scene: Scene, model: str, steps: int) -> Trajectory:
-    run = simulate(scene, model=model, scheme=SCHEME, steps=steps, every=steps // _SAMPLES, leap=True)
-    if run.trajectory is None or run.steps_done[0] < steps:
+def _run(scene: Scene, model: str, tolerance: float) -> Trajectory:
+    run = simulate(scene, model=model, scheme="event", steps=_SAMPLES, every=1, tolerance=tolerance)
+    if run.trajectory is None or run.steps_done[0] < _SAMPLES:
         raise InputError(f"ground.stiffness = {scene.ground.stiffness:g}: the run left the range of doubles")
     return run.trajectory
 
@@ -338,7 +334,7 @@ def _next(flags: npt.NDArray[np.bool_], start: int) -> int:
 
 
 def _told(scene: Scene, full: Trajectory, coarse: Trajectory, landings: _Landings) -> dict[str, float]:
-    """Return _OF_FULL of a run; coarse: the same at half as many steps."""
+    """Return _OF_FULL of a run; coarse: the same at a larger tolerance."""
     after, before = landings
     told = dict.fromkeys(_OF_FULL, math.nan)
     if after > 0:

@@ -59,7 +59,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     style.add_note(
         figure,
         f"against the full model (tumbling), launched upright at {launch['velocity']} m/s from {launch['position']} m; "
-        f"ωh = {float(dataset.attrs['omega_h']):g}; hollow: less than {_CLEAR:g} times what halving the steps changes",
+        f"by the scheme event; hollow: less than {_CLEAR:g} times what a hundredfold tolerance changes",
     )
     return figure
 
