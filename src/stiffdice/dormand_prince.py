@@ -153,35 +153,35 @@ def step(
 
 @njit
 def _combine(weights: Any, count: int, stages: Any, start: Any, h: float, end: Any) -> None:
-    for part in range(SIZE):
-        end[part] = 0.0
-    for stage in range(count):
-        weight = weights[stage]
-        if weight != 0.0:
-            for part in range(SIZE):
-                end[part] += weight * stages[stage, part]
-    for part in range(SIZE):
-        end[part] = start[part] + h * end[part]
+    """Set `end` to start + h Σ_i weights[i] stages[i]."""
+    # Four sums at a time: they stay in registers, and the compiler makes vectors of them.
+    for part in range(0, SIZE, 4):
+        a = b = c = d = 0.0
+        for stage in range(count):
+            weight = weights[stage]
+            a += weight * stages[stage, part]
+            b += weight * stages[stage, part + 1]
+            c += weight * stages[stage, part + 2]
+            d += weight * stages[stage, part + 3]
+        end[part] = start[part] + h * a
+        end[part + 1] = start[part + 1] + h * b
+        end[part + 2] = start[part + 2] + h * c
+        end[part + 3] = start[part + 3] + h * d
 
 
 @njit
-def error(stages: Any, scale: Any, h: float, sums: Any) -> float:
+def error(stages: Any, scale: Any, h: float, nothing: Any, sums: Any) -> float:
     """Return the estimated error of the step over what is tolerated, `scale` of each part of the motion.
 
     As in DOP853, the fifth-order estimate reined in by the third-order one: err5²/√(err5² + err3²/100).
-    sums: scratch, shape (2, SIZE).
+    nothing: zeros, shape (SIZE,). sums: scratch, shape (2, SIZE).
     """
-    for part in range(SIZE):
-        sums[0, part] = sums[1, part] = 0.0
-    for stage in range(STAGES):
-        five, three = ERROR_5[stage], ERROR_3[stage]
-        for part in range(SIZE):
-            sums[0, part] += five * stages[stage, part]
-            sums[1, part] += three * stages[stage, part]
+    _combine(ERROR_5, STAGES, stages, nothing, h, sums[0])
+    _combine(ERROR_3, STAGES, stages, nothing, h, sums[1])
     fifth = third = total = 0.0
     for part in range(SIZE):
-        fifth = max(fifth, abs(h * sums[0, part]) / scale[part])
-        third = max(third, abs(h * sums[1, part]) / scale[part])
+        fifth = max(fifth, abs(sums[0, part]) / scale[part])
+        third = max(third, abs(sums[1, part]) / scale[part])
         total += sums[0, part]
     if not math.isfinite(total):
         return math.inf

@@ -50,14 +50,16 @@ drags = by_tag({Ungated: _dragged, Gated: _left_alone})
 
 @njit
 def _turned(motion: Any, sense: float, a: float, b: float, c: float) -> tuple[float, float, float]:
-    """Return a vector turned by the motion's quaternion, of whatever norm, or with sense −1 turned back."""
+    """Return a vector turned by the motion's quaternion, or with sense −1 turned back.
+
+    The quaternion's norm is one but for what integration makes of it within a step.
+    """
     w, x, y, z = motion[9], sense * motion[10], sense * motion[11], sense * motion[12]
-    twice = 2.0 / (w * w + x * x + y * y + z * z)
     p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
     return (
-        a + twice * (w * p + y * r - z * q),
-        b + twice * (w * q + z * p - x * r),
-        c + twice * (w * r + x * q - y * p),
+        a + 2.0 * (w * p + y * r - z * q),
+        b + 2.0 * (w * q + z * p - x * r),
+        c + 2.0 * (w * r + x * q - y * p),
     )
 
 
@@ -275,6 +277,14 @@ def give(turning: bool, physics: Physics, nodes: Any, motion: Any, state: Any) -
         for k in range(NODES):
             x, y, z = _turned(motion, 1.0, nodes[k, 0], nodes[k, 1], nodes[k, 2])
             state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = x, y, z
+
+
+@njit
+def normalise(motion: Any) -> None:
+    """Give the quaternion the norm one."""
+    norm = math.sqrt(motion[9] ** 2 + motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
+    for part in range(9, 13):
+        motion[part] /= norm
 
 
 @njit

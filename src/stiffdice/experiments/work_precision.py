@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks, theory
+from stiffdice import checks, schemes, theory
 from stiffdice.io import layout
 from stiffdice.io.enums import enum_attributes
 from stiffdice.methods import (
@@ -39,7 +39,7 @@ from stiffdice.stepping import Path
 # What may be taken for right, best first; a peer is asked for all it can give.
 REFERENCES: dict[str, Effort] = (
     {name: Effort(SAMPLES, math.nan) for name in sorted(EXACT)}
-    | {name: Effort(SAMPLES, FINE) for name in sorted(CONTROLLED)}
+    | {name: Effort(SAMPLES, schemes.FINEST) for name in sorted(CONTROLLED)}  # finer than any rung
     | {"scipy_dop853": Effort(0, 1e-13), "scipy_lsoda": Effort(0, FINE)}
 )
 

@@ -32,6 +32,7 @@ from stiffdice.regime import (
     force_free,
     give,
     hardness,
+    normalise,
     passes,
     switches,
     take,
@@ -77,8 +78,8 @@ _NEAR = 1e-3
 
 # What a contact is computed in, one record, which reaches compiled code as a bare pointer (see `state.STATE`). nodes,
 # bits: those of the regime. here, there: the motion at a step's start and end; stages: rates in between. scale: what
-# error is tolerated. sums, table: scratch of the integrators. hard: see `regime.hardness`. value, slope: of the
-# switches at start and end; small: see `regime.vanishing`.
+# error is tolerated; nothing: zeros. sums, table: scratch of the integrators. hard: see `regime.hardness`. value,
+# slope: of the switches at start and end; small: see `regime.vanishing`.
 _WORK = np.dtype(
     [
         ("nodes", np.float64, (NODES, 3)),
@@ -87,6 +88,7 @@ _WORK = np.dtype(
         ("there", np.float64, SIZE),
         ("scale", np.float64, SIZE),
         ("stages", np.float64, (dormand_prince.STAGES + 1, SIZE)),
+        ("nothing", np.float64, SIZE),
         ("sums", np.float64, (2, SIZE)),
         ("table", np.float64, (extrapolation.COLUMNS, SIZE)),
         ("hard", np.float64, 3),
@@ -207,6 +209,7 @@ def _look_to(turning: bool, dragging: bool, physics: Physics, work: Any) -> None
 @njit
 def _move_on(work: Any) -> None:
     """Start from where the step ended."""
+    normalise(work.there)
     for part in range(SIZE):
         work.here[part] = work.there[part]
         work.stages[0, part] = work.stages[dormand_prince.STAGES, part]
@@ -265,7 +268,11 @@ def _attempt(turning: bool, physics: Physics, work: Any, h: float) -> tuple[floa
         )
         return error, extrapolation.ORDER, extrapolation.EVALUATIONS
     dormand_prince.step(turning, physics, work.nodes, work.bits, work.here, h, work.stages, work.there)
-    return dormand_prince.error(work.stages, work.scale, h, work.sums), dormand_prince.ORDER, dormand_prince.STAGES - 1
+    return (
+        dormand_prince.error(work.stages, work.scale, h, work.nothing, work.sums),
+        dormand_prince.ORDER,
+        dormand_prince.STAGES - 1,
+    )
 
 
 @njit
