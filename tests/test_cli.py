@@ -109,7 +109,7 @@ def test_bad_input_is_one_line_status_2_and_nothing_written(stiffdice, arguments
     assert (err.count("\n"), out, files) == (1, "", [])
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["inspect", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["advise", "--help"], ["inspect", "--help"]])
 def test_help_has_examples_that_name_the_command(stiffdice, arguments):
     status, out, _, _ = stiffdice(*arguments)
     assert status == 0

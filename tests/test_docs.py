@@ -19,7 +19,16 @@ from stiffdice.scene import PRESETS, Scene
 from stiffdice.schemes import SCHEMES
 
 ROOT = Path(__file__).parent.parent
-PAGES = ["README.md", "config/README.md", "results/README.md", "docs/method.md", "docs/stability.md", "CHANGELOG.md"]
+PAGES = [
+    "README.md",
+    "config/README.md",
+    "results/README.md",
+    "docs/method.md",
+    "docs/advice.md",
+    "docs/stability.md",
+    "docs/tradeoff.md",
+    "CHANGELOG.md",
+]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -118,7 +118,8 @@ def test_members_are_skipped_each_on_its_own():
 
 speeds = st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-8, 12)).map(list)
 spins = st.tuples(*[st.floats(-2, 2)] * 3).map(list)
-tilts = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.just(1.0)).map(list)
+# Not by round-off: friction makes chatter out of a slope of 1e-16, and chatter out of every other bit.
+tilts = st.tuples(st.integers(-99, 99), st.integers(-99, 99)).map(lambda tilt: [tilt[0] / 99, tilt[1] / 99, 1.0])
 
 
 @settings(max_examples=150, deadline=None)

@@ -108,3 +108,16 @@ def test_a_body_that_leaves_the_ground_flies():
 def test_a_body_that_never_lands_flies_on():
     scene = flying(velocity=(1, 2, 0), gravity=0.0, spin=(3, 2, 1))
     assert found(MODELS["tumbling"], physics_of(scene), start_of(scene, "tumbling"), 1e3) == 1e3
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (0.6, 0, 0.8)])
+def test_a_cube_that_a_contact_let_go_flies_though_round_off_has_it_below(normal):
+    """Else neither flight nor contact would move it: at S = 2.6e8 kg/s² one was let go 1.8e-15 m below."""
+    ulps = 7 * 2.0**-52
+    for below in (0.0, 0.5, 1.0):
+        scene = flying(position=(0, 0, 3), velocity=7.2 * np.array(normal), normal=list(normal))
+        start = start_of(scene, "sliding")
+        lowest = float((start["node_offset"][0] @ np.array(scene.ground.normal)).min())
+        start["position"][0] = -lowest * np.array(scene.ground.normal)
+        start["position"][0] -= below * ulps * (1.0 - lowest) * np.array(scene.ground.normal)
+        assert found(MODELS["sliding"], physics_of(scene), start, 0.01) == 0.01

@@ -1,8 +1,9 @@
-"""How far a long run is, on standard error; a run of under two seconds says nothing."""
+"""How far a long run is, and what a command is at, on standard error; what takes under two seconds says nothing."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from types import TracebackType
 
@@ -41,3 +42,36 @@ class Progress:
     ) -> None:
         if self._shown and self._terminal:
             print(" " * 40, end="\r", file=sys.stderr, flush=True)
+
+
+class Notes:
+    """What a command is at, on standard error; one of under two seconds says nothing."""
+
+    def __init__(self, what: str) -> None:
+        self._what, self._shown = what, False
+        self._terminal = sys.stderr.isatty()
+        self._line, self._timer = "", threading.Timer(QUIET_SECONDS, self._say)
+        self._timer.daemon = True
+
+    def __enter__(self) -> Notes:
+        self._timer.start()
+        return self
+
+    def show(self, text: str) -> None:
+        """Say what is done next, once two seconds are over."""
+        self._line = f"{self._what} {text}"
+        if self._shown:
+            self._say()
+
+    def _say(self) -> None:
+        first = "" if self._shown else " (a first time compiles, which may take a minute)"
+        self._shown = True
+        start, end = ("\r\x1b[K", "") if self._terminal else ("", "\n")
+        print(f"{start}{self._line}{first}", end=end, file=sys.stderr, flush=True)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._timer.cancel()
+        if self._shown and self._terminal:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)

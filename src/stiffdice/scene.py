@@ -185,11 +185,16 @@ def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = N
     """Return the scene in a YAML file, with `key.path=value` overrides; raises InputError naming the file."""
     data = yaml_file.load(path)
     try:
-        for override in overrides:
-            data = _override(data, override)
-        return from_mapping(data, preset)
+        return changed(data, overrides, preset)
     except InputError as error:
         raise error.within(str(path)) from None
+
+
+def changed(mapping: object, overrides: Sequence[str] = (), preset: str | None = None) -> Scene:
+    """Return the scene that plain data describe, with `key.path=value` overrides; raises InputError."""
+    for override in overrides:
+        mapping = _override(mapping, override)
+    return from_mapping(mapping, preset)
 
 
 def _override(data: Any, text: str) -> Any:

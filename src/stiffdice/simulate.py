@@ -150,8 +150,11 @@ def simulate(
         samples[0] = ensemble[0]
     _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, schemes.LAGS[scheme])
 
-    reached, first = 0, 100 if scheme in schemes.OWN_STEPS else 20_000
-    chunk = steps if progress is None else first
+    reached, chunk, longest = 0, 20_000, steps
+    if scheme in schemes.OWN_STEPS:  # of which one may take as long as all before
+        chunk = longest = max(1, min(100, steps // 200))
+    if progress is None:
+        chunk = steps
     while reached < steps:
         begun = time.perf_counter()
         reached = min(steps, reached + chunk)
@@ -176,7 +179,8 @@ def simulate(
         )
         if progress is not None:
             progress(reached / steps)
-            chunk = int(chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))) + 1
+            wanted = chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))
+            chunk = min(longest, int(wanted) + 1)
 
     found = values(watched.memory)
     endings = {

@@ -23,6 +23,10 @@ _ADVANCES = 1000
 
 _ULPS = 4 * 2.0**-52
 
+# A node that a contact has let go may be below the ground by the round-off that `regime.py` allows, and a little more:
+# were it taken to touch, neither flight nor contact would ever move it.
+_BELOW = 4
+
 
 @njit
 def _earliest(clearance: float, speed: float, pull: float) -> float:
@@ -52,7 +56,9 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
     wx, wy, wz = spin[0] / physics.inertia, spin[1] / physics.inertia, spin[2] / physics.inertia
     rate = math.sqrt(wx * wx + wy * wy + wz * wz) if models.turns(model) else 0.0
     parts = _level_parts(physics, state, rate, wx, wy, wz)
-    small = _ULPS * (abs(height) + abs(speed) * time + physics.reach)
+    place = state.position
+    length = abs(physics.nx * place[0]) + abs(physics.ny * place[1]) + abs(physics.nz * place[2])
+    small = _ULPS * (length + abs(speed) * time + physics.reach)
     for _ in range(_ADVANCES):
         centre = height + time * (speed - 0.5 * pull * time)
         rising = speed - pull * time
@@ -61,7 +67,7 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
         for k in range(parts.shape[0]):
             clearance = centre + parts[k, 0] + cosine * parts[k, 1] + sine * parts[k, 2]
             turning = rate * (cosine * parts[k, 2] - sine * parts[k, 1])
-            touches = touches or clearance < -small or (clearance <= small and rising + turning < 0.0)
+            touches = touches or clearance < -_BELOW * small or (clearance <= small and rising + turning < 0.0)
             hardest = pull + rate * rate * parts[k, 3]
             pace = min(pace, _earliest(clearance, rising + turning, hardest))
         if touches:
