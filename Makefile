@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install paper stability extremes tradeoff study report test lint types check lock clean
+.PHONY: help install paper stability extremes tradeoff study report test test-fast lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,6 +39,9 @@ report: paper  ## results/paper/report.html: every figure with its caption, code
 
 test: $(READY)  ## run all tests
 	@$(BIN)/python -m pytest
+
+test-fast: $(READY)  ## run the tests but for the broadest, in under three minutes
+	@$(BIN)/python -m pytest -m "not long"
 
 lint: $(READY)  ## check style (ruff) and the workflow (snakemake --lint)
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/snakemake --lint

@@ -60,6 +60,7 @@ def test_a_promise_is_kept(kind, stiffness, error):
 
 
 @pytest.mark.parametrize(("scheme", "stiffness"), [("symplectic_euler", 1e4), ("symplectic_euler", 1e6), ("rk4", 1e6)])
+@pytest.mark.long
 def test_extrapolated_steps_keep_the_error_too(scheme, stiffness):
     """What a few short runs foresee, long ones do."""
     problem = scene(duration=2.0, stiffness=stiffness)
@@ -101,6 +102,7 @@ def test_a_false_promise_is_found_broken():
     assert not check(advice, run_advised(advice, fixed)).kept
 
 
+@pytest.mark.long
 def test_chaos_is_told_and_the_promise_ends_before_it():
     problem = scene(duration=20.0)
     advice = advise(problem, 0.01, scheme="event")
@@ -125,6 +127,7 @@ def test_an_error_below_round_off_is_refused_with_the_floor():
     assert json.loads(as_json(advice))["advised"] is None
 
 
+@pytest.mark.long
 def test_all_schemes_that_fit_are_compared():
     advice = advise(scene(stiffness=1e6), 1e-3)
     names = {option.scheme for option in advice.options}
@@ -182,6 +185,7 @@ def test_outside_the_studied_range_is_said(change, told):
     assert json.loads(as_json(advice))["outside"] == list(advice.outside)
 
 
+@pytest.mark.long
 def test_where_nothing_touches_the_parabola_is_all():
     advice = advise(scene(duration=0.5), 1e-9, scheme="event")
     assert advice.model == "flying"

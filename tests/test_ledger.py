@@ -30,7 +30,11 @@ EULER = "symplectic_euler"
 
 LANDING = [name for name in MODELS if name in TOUCHING]  # a cube that lands is not one that flies
 # Every scheme, but every model and law of the paper's only: each combination is compiled for some seconds.
-OTHERS = [(scheme, "tumbling", "gated") for scheme in BOOKED if scheme not in (EULER, "exact")]
+OTHERS = [
+    pytest.param(scheme, "tumbling", "gated", marks=pytest.mark.long)
+    for scheme in BOOKED
+    if scheme not in (EULER, "exact")
+]
 for_all = pytest.mark.parametrize(("scheme", "model", "contact"), [*itertools.product([EULER], LANDING, LAWS), *OTHERS])
 
 

@@ -15,6 +15,8 @@ from stiffdice.requirement import least_model
 from stiffdice.scene import Scene, from_mapping
 from stiffdice.state import physics_of, start_of
 
+pytestmark = pytest.mark.long
+
 STIFFNESS, FRICTION = (1e3, 1e5), (0.0, 0.01, 0.075)
 
 
@@ -106,6 +108,7 @@ def test_work_is_counted_and_everything_has_units(measured):
         assert variable.attrs["long_name"], name
 
 
+@pytest.mark.long
 def test_times_are_told_apart_from_what_rebuilds_share():
     timed = pieces.time(Scene().with_ground(contact="gated"), steps=500, rounds=3)
     assert timed.step_time.dims == ("piece", "role")

@@ -13,6 +13,8 @@ from stiffdice.peers import PEERS
 from stiffdice.problems import MEASURES, SAMPLES
 from stiffdice.scene import from_mapping
 
+pytestmark = pytest.mark.long
+
 SCENE = from_mapping(
     {
         "ground": {"damping": 0.1, "friction": 0.1},

@@ -109,7 +109,7 @@ def test_the_cost_does_not_grow_with_the_stiffness():
     assert hard < 800
 
 
-@pytest.mark.parametrize("contact", ["gated", "ungated"])
+@pytest.mark.parametrize("contact", ["gated", pytest.param("ungated", marks=pytest.mark.long)])
 @pytest.mark.parametrize("stiffness", STIFFNESSES)
 @pytest.mark.parametrize("damping", [0.0, 0.3, 5.0])
 def test_a_flat_bounce_has_the_exact_restitution(stiffness, damping, contact):
@@ -139,7 +139,7 @@ def test_a_flat_bounce_has_the_exact_restitution(stiffness, damping, contact):
 
 
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
-@pytest.mark.parametrize("contact", ["gated", "ungated"])
+@pytest.mark.parametrize("contact", ["gated", pytest.param("ungated", marks=pytest.mark.long)])
 def test_where_a_run_is_cut_into_steps_does_not_matter(model, contact):
     spin = (0.3, 0.5, 0.2) if model == "tumbling" else (0, 0, 0)
     scene = throw(contact=contact, spin=spin, duration=2.0)
@@ -166,7 +166,7 @@ EXTREMES = {
 
 
 @pytest.mark.parametrize("name", EXTREMES)
-@pytest.mark.parametrize("contact", ["gated", "ungated"])
+@pytest.mark.parametrize("contact", ["gated", pytest.param("ungated", marks=pytest.mark.long)])
 def test_energy_never_rises_beyond_the_tolerance(name, contact):
     ground, rest = EXTREMES[name]
     scene = throw(contact=contact, **{"duration": 4.0, **rest}, **ground)

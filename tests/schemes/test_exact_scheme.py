@@ -222,6 +222,7 @@ SLIDES = [
 
 @pytest.mark.parametrize(("given", "velocity", "duration"), SLIDES)
 @pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.long
 def test_a_slide_against_40_digits(contact, given, velocity, duration):
     scene = scene_of(contact, velocity=velocity, duration=duration, **given)
     error, path = error_of(scene), np.abs(end_of(scene)[:2]).max()
@@ -269,6 +270,7 @@ def test_how_the_time_is_split_changes_nothing(contact, given, most):
 
 
 @pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.long
 def test_tiny_steps_through_a_contact(contact):
     """A million steps of 1e-12 s on ground of 1e12 kg/s²: 2 radians in its spring."""
     deep = {"position": (0, 0, HALF - 1e-7), "velocity": (1, 0, -1)}
@@ -347,6 +349,7 @@ def test_scipy_agrees(contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.long
 def test_the_papers_scheme_converges_to_it(contact):
     scene = scene_of(contact, 1e4, 0.2, 0.075, duration=2.5)
     expected = end_of(scene)

@@ -16,6 +16,7 @@ PHASES = np.linspace(0.02, 0.98, 13)
 
 
 @pytest.mark.parametrize("omega_h", [0.01, 0.03, 0.1, 0.3])
+@pytest.mark.long
 def test_small_steps_eat_part_of_the_bounce(omega_h):
     """By (1 + q²)^(−1/2) a step of q = ωh, over π/q steps, but for parts of a step at both ends, by (1 + q²)^(±1/2)."""
     e = np.sqrt([bounced(omega_h, phase, SCHEME) for phase in PHASES])
@@ -45,6 +46,7 @@ def test_no_step_gains_energy_however_stiff_and_coarse(stiffness, steps, damping
     assert np.diff(energy).max() < 0
 
 
+@pytest.mark.long
 def test_a_stiff_throw_never_gains_and_comes_to_rest():
     for friction in (0.075, 1.5):
         ground = {"contact": "gated", "stiffness": 1e12, "friction": friction}

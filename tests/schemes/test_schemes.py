@@ -87,6 +87,7 @@ def rocking_and_twirling():
 
 
 @ordered
+@pytest.mark.long
 def test_order_of_convergence_of_a_turning_cube(scheme):
     """Against rk4 at steps so fine that its own error, by its order, is round-off."""
 
@@ -154,7 +155,12 @@ def test_free_flight_is_exact_at_any_step(scheme):
         np.testing.assert_array_equal(end["angular_velocity"], spin)
 
 
-CONTACTS = [("sliding", "gated", 0), ("sliding", "gated", 0.3), ("tumbling", "gated", 0.3), ("sliding", "ungated", 0.3)]
+CONTACTS = [
+    ("sliding", "gated", 0),
+    ("sliding", "gated", 0.3),
+    pytest.param("tumbling", "gated", 0.3, marks=pytest.mark.long),
+    pytest.param("sliding", "ungated", 0.3, marks=pytest.mark.long),
+]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -313,6 +313,7 @@ def test_another_study_does_not_mind_a_broken_paper(finished, edited):
     assert finished.jobs_due() == {}
 
 
+@pytest.mark.long
 def test_a_damaged_shard_is_named_with_its_remedy(finished, tmp_path):
     (shard, *_) = sorted((finished.folder / "results/tiny/sweeps/steps/shards").glob("*.h5"))
     content, stat = shard.read_bytes(), shard.stat()
@@ -346,6 +347,7 @@ def test_lint_finds_nothing(finished):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other = Project(tmp_path)
     other.plan({**TINY, "sweeps": {"steps": {**TINY["sweeps"]["steps"], "columns_per_shard": 1}}})
@@ -355,6 +357,7 @@ def test_shard_size_and_order_change_no_number(finished, tmp_path):
     assert other.results(*data) == finished.results(*data)
 
 
+@pytest.mark.long
 def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
     """kill -9 to Snakemake and all its jobs, at the moment the first shard is there."""
     project = Project(tmp_path)
@@ -378,6 +381,7 @@ def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
     assert project.results(*DATA) == finished.results(*DATA)
 
 
+@pytest.mark.long
 def test_where_the_time_went_is_told(finished):
     done = subprocess.run(
         [sys.executable, "workflow/run.py", "--cores", "2", "study", "--forcerun", "collect", "--config", "study=tiny"],

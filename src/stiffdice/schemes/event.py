@@ -166,13 +166,12 @@ def _go_through(
         if forced > _FORCED or not math.isfinite(work.small[1]):
             work.here[:] = math.nan
             break
-        h = max(h, pace * change) if change > 1.0 else pace * change
         _look_to(turning, dragging, physics, work)
         lowest = _dip(work, pace)
-        if lowest < pace:
-            pace = lowest
-            evaluations += _attempt(turning, physics, work, pace)[2] + 1
-            _look_to(turning, dragging, physics, work)
+        if 0.0 < lowest < pace:  # a touch that begins and ends within the step: to be met, or missed, at its deepest
+            h = lowest
+            continue
+        h = max(h, pace * change) if change > 1.0 else pace * change
         zero = _first_zero(work, pace)
         met = zero <= pace and idle <= SWITCHES
         if met:
@@ -331,20 +330,18 @@ def _first_zero(work: Any, h: float) -> float:
 @njit
 def _locate(turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float) -> tuple[float, int]:
     """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, and evaluations."""
-    evaluations = _attempt(turning, physics, work, when)[2] + 1
-    _look_to(turning, dragging, physics, work)
+    evaluations, change = 0, math.inf
     for _ in range(_CORRECTIONS):
-        better = min(most, max(0.0, when + _correction(work, when)))
-        if better == when:
-            break
-        change = better - when
         if abs(change) * max(work.hard[0], work.hard[1]) < _NEAR:
             _shift(turning, physics, work, change)
             evaluations += 4
         else:
-            evaluations += _attempt(turning, physics, work, better)[2] + 1
+            evaluations += _attempt(turning, physics, work, when)[2] + 1
         _look_to(turning, dragging, physics, work)
-        when = better
+        better = min(most, max(0.0, when + _correction(work, when)))
+        if better == when:
+            break
+        change, when = better - when, better
     return when, evaluations
 
 
