@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from stiffdice.compiled import njit
-from stiffdice.contact import Wrench, lowest_of, normal_force, reaches
+from stiffdice.contact import Wrench, normal_force, reaches
 from stiffdice.models import sliding
 from stiffdice.state import Physics
 
@@ -23,6 +23,10 @@ TAG = Vertical()
 # Its launch has no velocity along the ground, and nothing gives it one.
 motion = sliding.motion
 move = sliding.move
+turn = sliding.turn
+turns = sliding.turns
+touches = sliding.touches
+extent = sliding.extent
 
 
 @njit
@@ -49,26 +53,3 @@ def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
 def drift(physics: Physics, state: Any, h: float) -> None:
     """Advance the height by h [s] at the state's velocity (equation 7)."""
     state.position[2] += h * state.velocity[2]
-
-
-@njit
-def turn(physics: Physics, state: Any, duration: float) -> None:
-    """Do nothing: this model does not turn the cube."""
-
-
-@njit
-def turns() -> bool:
-    """Return that the body does not turn."""
-    return False
-
-
-@njit
-def touches() -> bool:
-    """Return that the ground can act on the body."""
-    return True
-
-
-@njit
-def extent(physics: Physics, state: Any) -> float:
-    """Return how far below the centre the lowest node is, in a free flight, too [m]."""
-    return lowest_of(physics, state)
