@@ -40,7 +40,7 @@ report: paper  ## results/paper/report.html: every figure with its caption, code
 test: $(READY)  ## run all tests
 	@$(BIN)/python -m pytest
 
-test-fast: $(READY)  ## run the tests but for the broadest, in under three minutes
+test-fast: $(READY)  ## run the tests but for the broadest
 	@$(BIN)/python -m pytest -m "not long"
 
 lint: $(READY)  ## check style (ruff) and the workflow (snakemake --lint)
