@@ -23,7 +23,7 @@ from stiffdice.stepping import Path
 # Schemes whose error does not depend on the step, and that know flat landings only.
 EXACT = frozenset({"exact"})
 # Schemes that control their own error; steps are the intervals after which a state is known.
-CONTROLLED = frozenset({"event"})
+CONTROLLED = schemes.OWN_STEPS
 
 # Stands for every method that can run a problem.
 ALL = "all"
