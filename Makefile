@@ -8,16 +8,19 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install paper stability extremes tradeoff study report test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff peers study report bench test test-fast lint types check lock clean
 
 help:  ## show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 install: $(READY)  ## set up .venv from the lock file (the other targets do it, too)
 
 $(READY): requirements/build.lock requirements/requirements.lock pyproject.toml requirements/install
 	@PYTHON="$(PYTHON)" requirements/install $(VENV)
 	@touch $@
+
+install-engines: $(READY)  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
+	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
 
 paper: $(READY)  ## rebuild everything the paper shows, into results/paper/
 	@$(BIN)/python workflow/run.py --cores $(CORES) paper
@@ -31,11 +34,17 @@ extremes: $(READY)  ## where and how runs fail at the extremes, into results/ext
 tradeoff: $(READY)  ## what accuracy costs by scheme, into results/tradeoff/
 	@$(BIN)/python workflow/run.py --cores $(CORES) tradeoff
 
+peers: $(READY)  ## the engines that are installed beside stiffdice, into results/peers/
+	@$(BIN)/python workflow/run.py --cores $(CORES) peers
+
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
 
 report: paper  ## results/paper/report.html: every figure with its caption, code and configuration
 	@$(BIN)/snakemake --cores $(CORES) paper --report results/paper/report.html
+
+bench: $(READY)  ## measure how fast it is, into results/bench/, and compare with the last time
+	@$(BIN)/stiffdice bench
 
 test: $(READY)  ## run all tests
 	@$(BIN)/python -m pytest
@@ -52,7 +61,7 @@ types: $(READY)  ## check types (mypy)
 check: lint types test  ## all of the above
 
 lock: $(READY)  ## renew the lock files from requirements/*.in (needs uv on the PATH)
-	@for name in build requirements; do \
+	@for name in build requirements engines; do \
 	  uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
 	    --no-emit-index-url --custom-compile-command "make lock" \
 	    requirements/$$name.in -o requirements/$$name.lock; done

@@ -4,6 +4,7 @@
 #   snakemake stability                   what "stable" means, measured
 #   snakemake extremes                    where and how runs fail at the extremes
 #   snakemake tradeoff                    what accuracy costs, by scheme
+#   snakemake peers                       other engines beside stiffdice, as far as they are installed
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -42,6 +43,11 @@ rule extremes:
 rule tradeoff:
     input:
         lambda wildcards: everything_of("tradeoff"),
+
+
+rule peers:
+    input:
+        lambda wildcards: everything_of("peers"),
 
 
 rule study:

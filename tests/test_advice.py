@@ -59,17 +59,20 @@ def test_a_promise_is_kept(kind, stiffness, error):
     assert found.found <= error
 
 
-@pytest.mark.parametrize(("scheme", "stiffness"), [("symplectic_euler", 1e4), ("symplectic_euler", 1e6), ("rk4", 1e6)])
+@pytest.mark.parametrize(
+    ("scheme", "stiffness", "budget"),
+    [("symplectic_euler", 1e4, 1_000), ("symplectic_euler", 1e6, 400), ("rk4", 1e6, 150)],
+)
 @pytest.mark.long
-def test_extrapolated_steps_keep_the_error_too(scheme, stiffness):
+def test_extrapolated_steps_keep_the_error_too(scheme, stiffness, budget):
     """What a few short runs foresee, long ones do."""
     problem = scene(duration=2.0, stiffness=stiffness)
-    option = advise(problem, 1e-3, scheme=scheme, budget=2_000).options[0]
+    option = advise(problem, 1e-3, scheme=scheme, budget=budget).options[0]
     assert option.basis == EXTRAPOLATED
     assert option.error <= 1e-3
     pilot = flown(problem)
     run = tried(problem, pilot.model, scheme, option.steps)
-    assert run.computed > 2_000
+    assert run.computed > budget
     assert pilot.error(run)[-1] <= 1e-3
 
 

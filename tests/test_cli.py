@@ -53,6 +53,19 @@ def test_every_option_is_heard(stiffdice):
         assert (scene["ground"]["contact"], scene["ground"]["stiffness"], scene["cube"]["mass"]) == ("gated", 1e5, 0.5)
 
 
+def test_another_simulator_makes_the_same_file(stiffdice):
+    for simulator, target in (("stiffdice", "ours.h5"), ("numpy", "theirs.h5")):
+        options = ["--model", "sliding", "--steps", "2000", "--simulator", simulator, "-o", target]
+        assert stiffdice("run", SCENE, *options)[0] == 0
+    with xr.open_dataset("ours.h5") as ours, xr.open_dataset("theirs.h5") as theirs:
+        xr.testing.assert_allclose(theirs, ours, rtol=1e-9)
+        assert {key for key in ours.attrs if str(ours.attrs[key]) != str(theirs.attrs[key])} == {
+            *("simulator", "simulator_version", "code_digest"),
+        }
+        assert theirs.attrs["simulator_version"] == f"numpy {np.__version__}"
+        assert ours.attrs["simulator_version"] == f"stiffdice {ours.attrs['stiffdice_version']}"
+
+
 @pytest.mark.parametrize(
     ("change", "verdict"),
     [
@@ -77,6 +90,9 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", SCENE, "-o", SCENE], "is the scene itself"),
         (["run", SCENE, "-o", "out.h5", "--set", "cube=[1"], "--set cube=[1: line 1: not valid YAML"),
         (["run", SCENE], "required: -o"),
+        (["run", SCENE, "-o", "out.h5", "--simulator", "dice"], "simulator = dice: allowed is stiffdice or mujoco"),
+        (["run", SCENE, "-o", "out.h5", "--simulator", "numpy", "--scheme", "rk4"], "allowed is symplectic_euler"),
+        (["run", SCENE, "-o", "out.h5", "--simulator", "numpy", "--ledger"], "--ledger: simulator = numpy: allowed is"),
         (["run", SCENE, "-o", "out.h5", "--steps", "0"], "--steps = 0: allowed is a whole number from 1"),
         (["run", SCENE, "-o", "out.h5", "--steps", "-5"], "--steps = -5: allowed"),
         (["run", SCENE, "-o", "out.h5", "--steps", "ten"], "--steps = ten: allowed"),

@@ -15,8 +15,10 @@ import yaml
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.cli import main
 from stiffdice.criteria import CRITERIA
+from stiffdice.peers import ENGINES
 from stiffdice.scene import PRESETS, Scene
 from stiffdice.schemes import SCHEMES
+from stiffdice.simulators import OURS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [
@@ -25,8 +27,12 @@ PAGES = [
     "results/README.md",
     "docs/method.md",
     "docs/advice.md",
+    "docs/speed.md",
     "docs/stability.md",
     "docs/tradeoff.md",
+    "docs/peers.md",
+    "docs/peers-drake.md",
+    "docs/peers-mujoco-pybullet.md",
     "CHANGELOG.md",
 ]
 
@@ -109,6 +115,16 @@ def test_every_scheme_is_explained(capsys):
         main(["run", "--help"])
     told = capsys.readouterr().out
     assert all(name in told for name in SCHEMES)
+
+
+def test_every_engine_is_explained(capsys):
+    for page, heading in (("docs/peers.md", "Engines"), ("config/README.md", "Study")):
+        told = " ".join(row[0] for row in table_keys(page, heading))
+        assert all(f"`{name}`" in told for name in ENGINES), page
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    told = capsys.readouterr().out
+    assert all(name in told for name in [OURS, *ENGINES])
 
 
 def test_make_targets_of_the_readme_exist():

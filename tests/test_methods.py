@@ -7,20 +7,23 @@ import numpy as np
 import pytest
 
 from stiffdice import theory
+from stiffdice.errors import InputError
 from stiffdice.methods import (
     ALL,
     COARSE,
     FINE,
     LONGEST,
+    STEPPING,
     Effort,
     chosen_from,
     fixed_step,
     ladder,
+    lead,
     methods_for,
     path_of,
     plain,
 )
-from stiffdice.peers import PEERS
+from stiffdice.peers import SOLVERS
 from stiffdice.problems import PROBLEMS, SAMPLES, scene_of
 from stiffdice.scene import from_mapping
 from stiffdice.schemes import SCHEMES
@@ -29,11 +32,11 @@ BASE = from_mapping({"launch": {"angular_momentum": [0.3, 0.5, 0.2]}, "duration"
 FLAT = PROBLEMS["flat-bounce"]
 
 
-def test_every_scheme_and_every_peer_is_tried():
-    assert methods_for(FLAT) == [*SCHEMES, *PEERS]
+def test_every_scheme_and_every_solver_is_tried():
+    assert methods_for(FLAT) == [*SCHEMES, *SOLVERS]
     assert chosen_from(FLAT, [ALL]) == methods_for(FLAT)
     assert chosen_from(FLAT, ["scipy_lsoda"]) == ["scipy_lsoda"]
-    assert set(PEERS) <= set(methods_for(PROBLEMS["tumbling-throw"]))
+    assert set(SOLVERS) <= set(methods_for(PROBLEMS["tumbling-throw"]))
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e7])
@@ -66,6 +69,20 @@ def test_flights_taken_at_once_change_no_more_than_round_off(problem):
     np.testing.assert_allclose(leaped.states["position"], stepped.states["position"], rtol=0, atol=1e-9)
     assert leaped.evaluations == stepped.evaluations == 12_000
     assert leaped.computed < 6_000
+
+
+def test_an_engine_named_goes_up_the_ladder_of_a_fixed_step():
+    """And is not tried unasked; a lagging velocity is known to lag."""
+    scene, effort = scene_of(FLAT, BASE, 100), Effort(120, math.nan)
+    assert chosen_from(FLAT, ["numpy", "rk4"]) == ["numpy", "rk4"]
+    assert not set(STEPPING) & set(methods_for(FLAT))
+    with pytest.raises(InputError, match="methods = scipy: allowed is symplectic_euler or"):
+        chosen_from(FLAT, ["scipy"])
+    assert [*ladder(scene, "numpy", 2, 1e5)] == [*ladder(scene, "symplectic_euler", 2, 1e5)]
+    assert lead(scene, "numpy", effort) == lead(scene, "symplectic_euler", effort) > 0
+    theirs, ours = (path_of(FLAT, scene, name, effort, 10**6) for name in ("numpy", "symplectic_euler"))
+    np.testing.assert_allclose(theirs.states["position"], ours.states["position"], rtol=0, atol=1e-12)
+    assert theirs.computed == theirs.evaluations == ours.evaluations == 120
 
 
 def test_past_its_budget_a_run_is_not_known():

@@ -34,30 +34,33 @@ def digest_of(copy, module):
 SIMULATION = {"stiffdice.simulate", "stiffdice.sweep", "stiffdice.io.layout"}
 DRAWING = {"stiffdice.figures.cube"}
 COMPARING = {"stiffdice.experiments.work_precision"}
+DRIVING = {"stiffdice.driving"}
 
 
 @pytest.mark.parametrize(
     ("changed", "touches"),
     [
-        ("contact.py", SIMULATION | COMPARING),
-        ("models/tumbling.py", SIMULATION | COMPARING),
-        ("criteria/apex.py", SIMULATION | COMPARING),
+        ("contact.py", SIMULATION | COMPARING | DRIVING),
+        ("models/tumbling.py", SIMULATION | COMPARING | DRIVING),
+        ("criteria/apex.py", SIMULATION | COMPARING | DRIVING),
         ("flight.py", SIMULATION | COMPARING),
         ("fine.py", {"stiffdice.sweep"}),
         ("io/spool.py", {"stiffdice.sweep"}),
-        ("peers/scipy_ivp.py", COMPARING),
+        ("peers/scipy_ivp.py", COMPARING | DRIVING),
+        ("peers/octave.m", COMPARING | DRIVING),
+        ("driving.py", DRIVING),
         ("figures/style.py", DRAWING),
         ("figures/cube.py", DRAWING),
         ("figures/frontier.py", set()),
         ("cli.py", set()),
-        ("__init__.py", SIMULATION | DRAWING | COMPARING),
+        ("__init__.py", SIMULATION | DRAWING | COMPARING | DRIVING),
     ],
 )
 def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
-    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING}
+    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING | DRIVING}
     with (copy / changed).open("a") as file:
         file.write("\n# changed\n")
-    after = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING}
+    after = {module: digest_of(copy, module) for module in before}
     assert {module for module in before if before[module] != after[module]} == touches
 
 

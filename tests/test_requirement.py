@@ -188,7 +188,8 @@ def test_no_model_is_reduced_that_the_full_one_would_show_wrong(name):
     keys, lesser = REDUCED_IN_VAIN[name]
     scene = scene_of(duration=6.0, **keys)
     assert least_model(scene)[0] == "tumbling"
-    less, full = (simulate(scene, model=model, steps=30_000).end for model in (lesser, "tumbling"))
+    # In the listings' order, whose sums do not cancel: what is in balance needs a push of round-off.
+    less, full = (simulate(scene, model=model, steps=30_000, leap=False).end for model in (lesser, "tumbling"))
     assert difference(less, full) > 1e-4
 
 

@@ -15,8 +15,10 @@ from stiffdice.criteria import CRITERIA
 from stiffdice.errors import InputError
 from stiffdice.grid import Column
 from stiffdice.models import MODELS
+from stiffdice.peers import ENGINES, PEERS, adapter_of
 from stiffdice.scene import PRESETS
 from stiffdice.schemes import SCHEMES
+from stiffdice.simulators import OURS
 
 TOP = Path(__file__).parent.parent
 
@@ -129,7 +131,7 @@ def names(sweep):
 
 def test_a_shards_name_tells_what_it_computes(sweep_of):
     before = names(sweep_of())
-    assert before == names(sweep_of())
+    assert before == names(sweep_of()) == names(sweep_of(simulator="stiffdice"))
     for key, value in {
         "seed": 2,
         "members": 9,
@@ -139,6 +141,7 @@ def test_a_shards_name_tells_what_it_computes(sweep_of):
         "model": "tumbling",
         "omega_h": {"from": 3, "to": 0.2, "count": 41},
         "criteria": {"energy": 0.05, "trajectory": 0.1},
+        "simulator": "numpy",
     }.items():
         assert before.isdisjoint(names(sweep_of(**{key: value}))), key
 
@@ -443,6 +446,7 @@ def test_the_schema_knows_what_the_code_knows(study_schema):
     kinds = schema["$defs"]
     assert kinds["model"]["enum"] == [*MODELS, "auto"]
     assert kinds["scheme"]["enum"] == list(SCHEMES)
+    assert kinds["simulator"]["enum"] == [OURS, *ENGINES]
     assert kinds["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
     text = study_schema.read_text()
     for registry in (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, catalogue.TIMINGS, CRITERIA):
@@ -481,3 +485,90 @@ def test_a_scheme_that_does_not_apply_is_told_when_the_study_is_read(kind, study
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(InputError, match=f"{kind}.*scheme = exact, model = tumbling: allowed is a model that does not"):
         study.load(path, study_schema)
+
+
+@pytest.fixture
+def without():
+    """Make engines as if they were not installed."""
+
+    def failing():
+        raise ModuleNotFoundError
+
+    with pytest.MonkeyPatch.context() as patch:
+
+        def remove(*engines):
+            for engine in engines:
+                patch.setitem(PEERS, engine, PEERS[engine]._replace(load=failing))
+            adapter_of.cache_clear()
+
+        yield remove
+    adapter_of.cache_clear()
+
+
+def test_an_engine_brings_its_own_scheme(sweep_of, changed):
+    assert sweep_of(simulator="scipy").scheme == "lsoda"
+    assert sweep_of(simulator="numpy", scheme="symplectic_euler").scheme == "symplectic_euler"
+    run = changed({"runs.figure-09.simulator": "scipy"}).runs["figure-09"]
+    assert (run.simulator, run.scheme) == ("scipy", "lsoda")
+    for path, told in (("runs.figure-09", "runs.figure-09"), (SWEEP, SWEEP)):
+        with pytest.raises(InputError, match=f"{told}: simulator = numpy: scheme = rk4: allowed is symplectic_euler"):
+            changed({f"{path}.simulator": "numpy", f"{path}.scheme": "rk4"})
+
+
+def test_a_scene_that_an_engine_cannot_represent_is_told_when_the_study_is_read(sweep_of, monkeypatch):
+    """Under each of the sweep's contact laws."""
+    adapter = adapter_of("numpy")
+    monkeypatch.setattr(adapter, "unfit", lambda scene, model: "no" if scene.ground.contact == "ungated" else None)
+    assert sweep_of(simulator="numpy", contact=["gated"]).simulator == "numpy"
+    with pytest.raises(InputError, match=f"{SWEEP}: simulator = numpy: no"):
+        sweep_of(simulator="numpy")
+
+
+def test_what_needs_an_engine_that_is_not_installed_is_left_out_with_a_line(changed, without):
+    """And with it what would have nothing left to show; the rest of the study is there."""
+    without("drake", "mujoco")
+    ours = changed({}).sweeps["steps-needed"]
+    sweep = yaml.safe_load((CONFIG / "quick.yaml").read_text())["sweeps"]["steps-needed"]
+    run = {"scene": "config/scenes/figure-09.yaml", "model": "tumbling", "steps": 100}
+    work = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml"}
+    found = changed(
+        {
+            "runs.theirs": run | {"simulator": "drake"},
+            "sweeps.theirs": sweep | {"simulator": "drake"},
+            "experiments.both": work | {"options": {"methods": ["rk4", "mujoco", "drake"]}},
+            "experiments.theirs": work | {"options": {"methods": ["mujoco"]}},
+            "timings.theirs": work | {"options": {"methods": ["drake"]}},
+            "figures.theirs-end": {"draw": "cube-end", "run": "theirs", "title": "x"},
+            "figures.frontier.of": ["steps-needed", "theirs"],
+            "figures.theirs": {"draw": "comb", "of": ["theirs"], "title": "x"},
+            "figures.evaluations": {"draw": "work-precision", "of": ["both", "theirs"], "title": "x"},
+            "figures.seconds": {"draw": "work-precision", "of": ["both"], "timings": ["theirs"], "title": "x"},
+            "tables.theirs": {"tell": "answers", "of": ["theirs"], "title": "x"},
+        }
+    )
+    assert set(found.runs) == {"figure-04", "figure-09"}
+    assert found.sweeps == {"steps-needed": ours}
+    assert {name: part.options["methods"] for name, part in found.experiments.items()} == {"both": ["rk4"]}
+    assert not found.timings
+    assert not found.tables
+    assert {name: part.of for name, part in found.figures.items() if part.of} == {
+        "frontier": ("steps-needed",),
+        "evaluations": ("both",),
+    }
+    assert found.figures["position"].run == "figure-04"
+    needs = "needs the package drake, which is not installed; make install-engines"
+    assert found.left_out[:2] == (
+        f"left out: runs.theirs: simulator = drake: {needs}",
+        f"left out: sweeps.theirs: simulator = drake: {needs}",
+    )
+    assert f"left out: experiments.both: methods = drake: {needs}" in found.left_out
+    for name in ("figures.theirs-end", "figures.theirs", "figures.seconds", "tables.theirs"):
+        assert f"left out: {name}: nothing of what it shows is there" in found.left_out
+
+
+def test_a_mistake_is_told_though_an_engine_is_not_installed(changed, without):
+    without("drake")
+    with pytest.raises(InputError, match=r"figures\.frontier\.of = others: allowed is steps-needed"):
+        changed({f"{SWEEP}.simulator": "drake", "figures.frontier.of": ["others"]})
+    with pytest.raises(InputError, match="simulator = dice: allowed is stiffdice, mujoco,"):
+        changed({f"{SWEEP}.simulator": "dice"})

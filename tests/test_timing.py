@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from stiffdice.timing import SHORTEST, interleaved, machine
+from stiffdice.timing import SHORTEST, Launched, interleaved, machine, seconds_of
 
 
 def test_runs_take_turns_and_a_long_one_is_called_once():
@@ -49,3 +49,18 @@ def test_the_machine_is_named():
 @pytest.mark.parametrize("key", ["machine_processor", "machine_system", "versions", "measured_at"])
 def test_what_is_told_of_it_is_text(key):
     assert isinstance(machine()[key], str)
+
+
+def test_what_makes_a_run_ready_is_not_timed():
+    order = []
+
+    def ready():
+        time.sleep(0.02)
+        order.append("ready")
+        return lambda: order.append("made")
+
+    run = Launched(ready)
+    assert seconds_of(run, 3) < 0.005
+    assert order == ["ready", "made"] * 3
+    run()
+    assert order == ["ready", "made"] * 4

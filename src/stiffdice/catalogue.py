@@ -53,6 +53,9 @@ DRAWINGS: dict[str, Entry] = {
     "cost": Entry(f"{_FIGURES}.cost", "position", "experiments", "work-precision", timed=True),
     "cost-restitution": Entry(f"{_FIGURES}.cost", "restitution", "experiments", "work-precision", timed=True),
     "cost-energy": Entry(f"{_FIGURES}.cost", "energy", "experiments", "work-precision", timed=True),
+    "engine-limits": Entry(f"{_FIGURES}.engine_limits", "draw", "experiments", "engine-limits"),
+    "engine-throw": Entry(f"{_FIGURES}.engine_throw", "draw", "experiments", "engine-throw"),
+    "engine-speed": Entry(f"{_FIGURES}.engine_speed", "draw", "timings", "engine-speed"),
     "pieces-time": Entry(f"{_FIGURES}.pieces", "draw_times", "timings", "pieces"),
 }
 
@@ -61,6 +64,9 @@ TABLES: dict[str, Entry] = {
     "answers": Entry("stiffdice.answers", "table", "sweeps"),
     "precision": Entry("stiffdice.precision", "table", "experiments", "precision"),
     "tradeoff": Entry("stiffdice.tradeoff", "table", "experiments", "work-precision", timed=True),
+    "engine-contact": Entry("stiffdice.engine_tables", "contact", "experiments", "engine-contact"),
+    "engine-limits": Entry("stiffdice.engine_tables", "limits", "experiments", "engine-limits"),
+    "engine-speed": Entry("stiffdice.engine_tables", "speed", "timings", "engine-speed"),
     "targets": Entry("stiffdice.tradeoff", "targets", "experiments", "work-precision", timed=True),
 }
 
@@ -74,10 +80,14 @@ EXPERIMENTS: dict[str, Entry] = {
     "precision": Entry("stiffdice.experiments.precision", "measure"),
     "pieces": Entry("stiffdice.experiments.pieces", "measure"),
     "work-precision": Entry("stiffdice.experiments.work_precision", "measure"),
+    "engine-contact": Entry("stiffdice.experiments.engine_contact", "measure"),
+    "engine-limits": Entry("stiffdice.experiments.engine_limits", "measure"),
+    "engine-throw": Entry("stiffdice.experiments.engine_throw", "measure"),
 }
 
 # (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.
 TIMINGS: dict[str, Entry] = {
     "work-precision": Entry("stiffdice.experiments.work_precision_time", "time"),
     "pieces": Entry("stiffdice.experiments.pieces", "time"),
+    "engine-speed": Entry("stiffdice.experiments.engine_speed", "time"),
 }

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from stiffdice import __version__
+from stiffdice.bench import BENCHMARKS
 from stiffdice.errors import InputError, StiffdiceError
 
 EXAMPLES = """\
@@ -17,12 +19,14 @@ examples:
   stiffdice run my-cube.yaml --model auto -o out.h5
   stiffdice advise my-cube.yaml --error 1%
   stiffdice inspect stiff.h5
+  stiffdice bench
 """
 RUN_EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
   stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
   stiffdice run my-cube.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o out.h5
+  stiffdice run my-cube.yaml --simulator mujoco --preset as_written --steps 20000 -o theirs.h5
 
 The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
 its verdict; 2 for bad input.
@@ -47,6 +51,16 @@ examples:
   stiffdice inspect results/paper/sweep/sweep.h5
   stiffdice inspect throw.h5 --json
 """
+BENCH_EXAMPLES = """\
+examples:
+  stiffdice bench
+  stiffdice bench listing engines
+  stiffdice bench --against another-machine.h5
+
+Times are medians of rounds in which everything takes turns; let nothing else run meanwhile. Stored are an HDF5 file
+with every sample, a page and a table, named by the time; what changed since the last one there is told, row by row,
+with what of it may be noise.
+"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -68,6 +82,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_advise(commands)
     _add_inspect(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -88,11 +103,17 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         help="vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)",
     )
     run.add_argument(
+        "--simulator",
+        default="stiffdice",
+        metavar="NAME",
+        help="stiffdice, or another engine where it is installed: mujoco, pybullet, drake, scipy, octave, numpy "
+        "(default: stiffdice)",
+    )
+    run.add_argument(
         "--scheme",
-        default="symplectic_euler",
         metavar="NAME",
         help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
-        "or exact where that is known (default: symplectic_euler)",
+        "or exact where that is known (default: symplectic_euler; another engine has its own)",
     )
     run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
     run.add_argument(
@@ -182,6 +203,21 @@ def _add_inspect(commands: argparse._SubParsersAction[_Parser]) -> None:
     inspect.set_defaults(call=_inspect)
 
 
+def _add_bench(commands: argparse._SubParsersAction[_Parser]) -> None:
+    bench = commands.add_parser(
+        "bench",
+        help="measure how fast it is, and compare with the last time",
+        description="Measure kernels, skipping, cold start, jobs and engines; store, and compare with the last time.",
+        epilog=BENCH_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    bench.add_argument("names", metavar="NAME", nargs="*", help=f"{', '.join(BENCHMARKS)} (default: all)")
+    bench.add_argument("--folder", default="results/bench", metavar="DIR", help="where (default: results/bench)")
+    bench.add_argument("--against", metavar="FILE.h5", help="compare with this one (default: the last in the folder)")
+    bench.add_argument("--quick", action="store_true", help="too short to tell times by; shows that all of it works")
+    bench.set_defaults(call=_bench)
+
+
 def _whole(option: str, text: str) -> int:
     """Return the whole number in an option's text; 1e5 counts as one."""
     from stiffdice import checks
@@ -216,7 +252,7 @@ def _run(options: argparse.Namespace) -> None:
         raise InputError(f"{target}: is the scene itself; name another file for the output")
 
     # These take about a second to import; bad input is told before.
-    from stiffdice import ledger, schemes
+    from stiffdice import ledger, schemes, simulators
     from stiffdice.io.layout import run_dataset
     from stiffdice.io.write import write_dataset
     from stiffdice.progress import Progress
@@ -224,15 +260,18 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.simulate import default_every, simulate
     from stiffdice.verdict import Verdict
 
+    scheme = simulators.scheme_of(options.simulator, options.scheme)
     if options.ledger:
-        checks.choice("--ledger: scheme", options.scheme, ledger.BOOKED)
+        checks.choice("--ledger: simulator", options.simulator, [simulators.OURS])
+        checks.choice("--ledger: scheme", scheme, ledger.BOOKED)
     every = default_every(steps) if options.every is None else _whole("--every", options.every)
     tolerance = schemes.TOLERANCE if options.tolerance is None else _number("--tolerance", options.tolerance)
     with Progress() as progress:
         run = simulate(
             scene,
             model=options.model,
-            scheme=options.scheme,
+            simulator=options.simulator,
+            scheme=scheme,
             steps=steps,
             tolerance=tolerance,
             every=every,
@@ -240,7 +279,7 @@ def _run(options: argparse.Namespace) -> None:
         )
     dataset = run_dataset(run)
     if options.ledger:
-        books = ledger.keep(scene, model=run.model, scheme=options.scheme, steps=steps)
+        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
     if options.model == AUTO:
@@ -318,6 +357,23 @@ def _inspect(options: argparse.Namespace) -> None:
 
     dataset = open_file(options.file)
     print(inspection.as_json(dataset) if options.json else inspection.as_text(dataset, options.file))
+
+
+def _bench(options: argparse.Namespace) -> None:
+    from stiffdice import checks
+
+    for name in options.names:
+        checks.choice("NAME", name, BENCHMARKS)
+
+    # These take about a second to import; bad input is told before.
+    from stiffdice.bench.run import bench
+    from stiffdice.progress import Notes
+
+    against = None if options.against is None else Path(options.against)
+    with Notes("bench:") as notes:
+        stored = bench(Path(options.folder), names=options.names, quick=options.quick, against=against, tell=notes.show)
+    print(stored.page)
+    print(f"{stored.path}: stored, with the same as .md and .csv")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

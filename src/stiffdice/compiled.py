@@ -8,9 +8,11 @@ versions that compile them.
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -54,17 +56,53 @@ _FOLDER = str(_cache_folder())
 os.environ["NUMBA_CACHE_DIR"] = _FOLDER
 
 import numba  # noqa: E402
+from numba.core.registry import CPUDispatcher  # noqa: E402
 from numba.extending import overload  # noqa: E402
 
 setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
+
+
+class _Part(CPUDispatcher):
+    """A compiled function that is meant for compiled code, without the wrappers for calls from Python.
+
+    They are a third of all time to compile. Who does call it from Python, a test, say, has one made for the call;
+    numba's own would jump to nowhere.
+    """
+
+    def add_overload(self, cres: Any) -> None:
+        """Keep what was compiled for compiled code to find, and for nobody else."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        bound = inspect.signature(self.py_func).bind(*arguments, **named)
+        return _callable(self)(*bound.args)
+
+
+@cache
+def _callable(part: _Part) -> Any:
+    def call(*arguments: Any) -> Any:
+        return part(*arguments)
+
+    return numba.njit(call, error_model="numpy", fastmath=False)
 
 
 def njit(*function: Any, **options: Any) -> Any:
     """Compile a function as numba's decorator does, with division by zero giving infinity or not-a-number.
 
     At the extremes a step, a stiffness or a weight may leave the range of doubles; that is a result, not an error.
+    Arithmetic is as written unless `fastmath` is asked for here: left unsaid, numba takes it from whoever happens to
+    call the function first. What is not kept in the cache on disk is a part of what is, and compiled as such.
     """
-    return numba.njit(*function, error_model="numpy", **options)
+    options = {"error_model": "numpy", "fastmath": False} | options
+    if options.get("cache"):
+        compiled: Any = numba.njit
+        return compiled(*function, **options)
+    options |= {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+    def part(python: Callable[..., Any]) -> _Part:
+        return _Part(python, targetoptions=options)
+
+    return part(*function) if function else part
 
 
 def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:
@@ -79,7 +117,7 @@ def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:
     def call(tag: Any, *arguments: Any) -> Any:
         raise TypeError("a kernel's part: call it from compiled code")
 
-    @overload(call, strict=False)
+    @overload(call, strict=False, jit_options={"forceinline": True})
     def _choose(tag: Any, *arguments: Any) -> Any:
         body = bodies[tag.instance_class]
         return lambda tag, *arguments: body(*arguments)

@@ -44,6 +44,11 @@ def _ungated_reaches(clearance: float) -> bool:
 
 
 @njit
+def _ungated_acts(clearance: Any, speed: float) -> bool:
+    return clearance <= 0.0 or speed < 0.0
+
+
+@njit
 def _gated_force(depth: float, speed: float, stiffness: float, damping: float) -> float:
     """As section 4.2 says: the same for a node below the ground, and nothing for any other."""
     if depth <= 0.0:
@@ -63,6 +68,11 @@ def _gated_reaches(clearance: float) -> bool:
     return clearance <= 0.0
 
 
+@njit
+def _gated_acts(clearance: Any, speed: float) -> bool:
+    return clearance <= 0.0
+
+
 # (law, depth, speed, stiffness, damping) -> the magnitude of the normal force on a node [N]. depth [m]: distance below
 # the ground, negative above it. speed [m/s]: along the outward normal.
 normal_force = by_tag({Ungated: _ungated_force, Gated: _gated_force})
@@ -73,6 +83,10 @@ normal_slopes = by_tag({Ungated: _ungated_slopes, Gated: _gated_slopes})
 
 # (law, clearance) -> whether the law can act on a body whose every node is at least `clearance` [m] above the ground.
 reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})
+
+# (law, clearance, speed) -> whether the law can act on a body in that place [m] whose every node moves away from the
+# ground at `speed` [m/s] at least.
+acts = by_tag({Ungated: _ungated_acts, Gated: _gated_acts})
 
 
 @njit
@@ -111,6 +125,13 @@ def room_of(physics: Any, state: Any) -> float:
         else:
             others = min(others, above)
     return others if touching == 4 else 0.0
+
+
+@njit
+def swing_square(omega: Any, h: Any, above_rest: Any, speed: Any) -> Any:
+    """Return u² + ω²y² − hω²uy [m²/s²], which symplectic Euler keeps of a swing on the ground; y: above rest [m]."""
+    oy = omega * above_rest
+    return speed * speed + oy * oy - h * omega * speed * oy
 
 
 @njit

@@ -15,5 +15,13 @@ class InputError(StiffdiceError):
         return InputError(f"{source}: {self}")
 
 
+class NotInstalledError(InputError):
+    """An engine that is asked for and is not there; a study leaves out what needs it."""
+
+    def within(self, source: str) -> NotInstalledError:
+        """Return the same error, told with where it was found."""
+        return NotInstalledError(f"{source}: {self}")
+
+
 class OutputError(StiffdiceError):
     """A result that could not be stored; nothing is left under its final name."""

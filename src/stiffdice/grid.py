@@ -13,6 +13,7 @@ import numpy as np
 from stiffdice import theory
 from stiffdice.requirement import AS_ASKED
 from stiffdice.scene import Scene
+from stiffdice.simulators import OURS
 from stiffdice.state import Array
 
 
@@ -29,7 +30,7 @@ class Sweep:
 
     criteria: tolerances of those asked. early_stop: whether a run ends once all of them are decided. refine: how many
     times the scan is made twice as dense where members disagree. horizon [s]: until when `trajectory` compares.
-    model: the one computed; model_reason: why.
+    model: the one computed; model_reason: why. simulator: what makes the runs; scheme: its own, if it is an engine.
     """
 
     scene: Scene
@@ -47,6 +48,7 @@ class Sweep:
     horizon: float
     columns_per_shard: int
     model_reason: str = AS_ASKED
+    simulator: str = OURS
 
     def scene_of(self, column: Column) -> Scene:
         """Return the sweep's scene on the ground of a column."""
@@ -114,6 +116,8 @@ class Sweep:
             plan.append(self.horizon)
         if self.model_reason != AS_ASKED:  # it is stored
             plan.append(self.model_reason)
+        if self.simulator != OURS:
+            plan.append({"simulator": self.simulator})
         # Other tolerances need other runs only where a run stops, or a scan is refined, because of them.
         if self.early_stop or self.refine:
             plan += [dict(self.criteria), self.early_stop]

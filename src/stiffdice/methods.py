@@ -1,7 +1,7 @@
 """Every way to run a problem, from one ladder of efforts: the schemes of the registry, and outside peers.
 
-A scheme of fixed step goes from a step as long as its contact bears to shorter ones; a method that controls its own
-error from a coarse tolerance to a fine one; an exact scheme has nothing to choose.
+A scheme or an engine of fixed step goes from a step as long as its contact bears to shorter ones; a method that
+controls its own error from a coarse tolerance to a fine one; an exact scheme has nothing to choose.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffdice import checks, peers, schemes, stepping, theory
-from stiffdice.peers import PEERS
+from stiffdice.peers import ENGINES, PEERS, SOLVERS
 from stiffdice.problems import SAMPLES, Problem
 from stiffdice.scene import Scene
 from stiffdice.simulate import simulate
@@ -25,7 +25,10 @@ EXACT = frozenset({"exact"})
 # Schemes that control their own error; steps are the intervals after which a state is known.
 CONTROLLED = schemes.OWN_STEPS
 
-# Stands for every method that can run a problem.
+# Engines that take the steps they are told, one by one.
+STEPPING = [name for name, peer in ENGINES.items() if not peer.own_steps]
+
+# Stands for every scheme that can run a problem, and the outside solvers; engines are named one by one.
 ALL = "all"
 
 # Tolerances of a method that controls its own error, ends of its ladder.
@@ -42,19 +45,27 @@ class Effort(NamedTuple):
 
 
 def methods_for(problem: Problem) -> list[str]:
-    """Return the names of all methods that can run a problem: schemes, then peers."""
-    return [name for name in schemes.SCHEMES if not (problem.turns and name in EXACT)] + list(PEERS)
+    """Return the names of all methods that ALL stands for: schemes, then outside solvers."""
+    return [name for name in schemes.SCHEMES if not (problem.turns and name in EXACT)] + list(SOLVERS)
 
 
 def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
-    """Return the methods of these names, or those that can run the problem for ALL; raises InputError for any other."""
+    """Return the methods of these names, or those that ALL stands for.
+
+    Raises InputError for any other name, and for an engine that is not installed.
+    """
     known = methods_for(problem)
-    return known if list(names) == [ALL] else [checks.choice("methods", name, [*known, ALL]) for name in names]
+    if list(names) == [ALL]:
+        return known
+    for name in names:
+        if checks.choice("methods", name, [*known, *STEPPING, ALL]) in PEERS:
+            peers.adapter_of(name, "methods")
+    return list(names)
 
 
 def fixed_step(method: str) -> bool:
     """Return whether a method takes steps of the size it is told."""
-    return method not in PEERS and method not in EXACT | CONTROLLED
+    return not PEERS[method].own_steps if method in PEERS else method not in EXACT | CONTROLLED
 
 
 def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Iterator[Effort]:
@@ -77,17 +88,17 @@ def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Ite
 def plain(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], Path]:
     """Return a function that makes a run step by step, from the launch, every time it is called."""
     if method in PEERS:
-        return peers.prepare(method, scene, problem.model, SAMPLES, effort.tolerance)
+        return peers.prepare(method, scene, problem.model, SAMPLES, effort.tolerance, effort.steps)
     tolerance = schemes.TOLERANCE if math.isnan(effort.tolerance) else effort.tolerance
     return stepping.prepare(scene, problem.model, method, SAMPLES, effort.steps, tolerance)
 
 
 def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget: int) -> Path:
-    """Return what came of a run; a fixed step's flights are taken at once, which agrees with stepping to round-off.
+    """Return what came of a run; a scheme's flights are taken at once, which agrees with stepping to round-off.
 
     budget: most steps to compute one by one; a run that needs more has not-a-number from there on.
     """
-    if not fixed_step(method):
+    if method in PEERS or not fixed_step(method):
         return plain(problem, scene, method, effort)()
     run = simulate(
         scene,
@@ -108,4 +119,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
 
 def lead(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
-    return schemes.LAGS[method] * scene.duration / effort.steps if fixed_step(method) else 0.0
+    if not fixed_step(method):
+        return 0.0
+    lag: float = peers.adapter_of(method).LAG if method in PEERS else schemes.LAGS[method]
+    return lag * scene.duration / effort.steps

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from stiffdice import models, schemes
 from stiffdice.compiled import njit
-from stiffdice.contact import height_of, lowest_of, reaches, speed_of
+from stiffdice.contact import height_of, lowest_of, reaches, speed_of, swing_square
 from stiffdice.flight import WORTHWHILE, lost
 from stiffdice.state import Physics
 
@@ -87,25 +87,35 @@ def phase_of(law: Any, physics: Physics, sight: Any, most: float) -> Phase:
 
 
 @njit
-def _rests(law: Any, physics: Physics, sight: Any) -> bool:
-    """Return whether a flat cube swings about its rest by less than its sag, so that it never leaves the ground.
+def resting_swing(law: Any, physics: Physics, sight: Any) -> float:
+    """Return below which √Q [m/s] a flat cube never leaves the ground, but for round-off; negative where not known.
 
     With y the height above that of rest and ω² = 4S/m, Q = u² + ω²y² − h ω² u y is what symplectic Euler keeps of an
     undamped cube on four nodes, and the swing is below √Q/(ω√(1 − (ωh)²/4)). A further acceleration δ adds hδ(u + u')
     to Q. Damping, and a push that cannot become a pull, act against the speed and so lower it, but in a step that turns
-    the cube around: by less than 0.6 rate·h (ωh)² Q there. Round-off of the height adds at most ω·ulp to √Q.
+    the cube around: by less than 0.6 rate·h (ωh)² Q there.
+    """
+    h, omega = sight.step_size, math.sqrt(4 * physics.stiffness / physics.mass)
+    damped = h * (8.0 if reaches(law, 1.0) else 4.0) * physics.damping / physics.mass
+    if omega * h > 0.5 or damped > 1.0 or not 0.0 < 2 * sight.sag < sight.room:
+        return -1.0
+    grows = math.exp(0.3 * sight.steps * damped * (omega * h) ** 2)
+    return omega * sight.sag * math.sqrt(1 - (omega * h) ** 2 / 4) / grows
+
+
+@njit
+def _rests(law: Any, physics: Physics, sight: Any) -> bool:
+    """Return whether a flat cube swings about its rest by less than its sag, so that it never leaves the ground.
+
+    Round-off of the height adds at most ω·ulp in a step to √Q.
     """
     # (ω·sag)² is pull·sag; most steps end here.
     if not sight.clearance < 0.0 or sight.speed * sight.speed > 2 * sight.pull * sight.sag:
         return False
-    h, omega = sight.step_size, math.sqrt(4 * physics.stiffness / physics.mass)
-    damped = h * (8.0 if reaches(law, 1.0) else 4.0) * physics.damping / physics.mass
-    if omega * h > 0.5 or damped > 1.0 or not 0.0 < 2 * sight.sag < sight.room:
-        return False
-    u, oy = sight.speed, omega * (sight.clearance + sight.sag)
-    swing = math.sqrt(u * u + oy * oy - h * omega * u * oy) * math.exp(0.3 * sight.steps * damped * (omega * h) ** 2)
+    omega = math.sqrt(4 * physics.stiffness / physics.mass)
+    square = swing_square(omega, sight.step_size, sight.clearance + sight.sag, sight.speed)
     lost = sight.steps * omega * 2.0**-52 * abs(sight.height)
-    return swing + lost < omega * sight.sag * math.sqrt(1 - (omega * h) ** 2 / 4)
+    return math.sqrt(square) + lost < resting_swing(law, physics, sight)
 
 
 @njit
@@ -119,6 +129,23 @@ def _hangs(law: Any, physics: Physics, sight: Any) -> bool:
     left = sight.steps * sight.step_size - (sight.time - sight.late)
     lost = sight.steps * 2.0**-52 * abs(sight.height)
     return max(-sight.speed, weight / drag) * left + lost < sight.clearance
+
+
+@njit
+def rest_of(model: Any, law: Any, physics: Physics, sight: Any) -> float:
+    """Return below which `swing_square` [m²/s²] a cube may rest, so that `skip` is asked; −1 where it never does."""
+    if models.turns(model) or not sight.room > 0.0 or sight.held > 0.0:
+        return -1.0
+    swing = resting_swing(law, physics, sight)
+    return swing * swing if swing > 0.0 else -1.0
+
+
+@njit
+def follows(scheme: Any, model: Any, physics: Physics, state: Any, sight: Any) -> bool:
+    """Return whether this is a motion of which `skip` knows the phases, and takes one as soon as it may."""
+    rubs = physics.friction > 0.0 and (state.velocity[0] != 0.0 or state.velocity[1] != 0.0)
+    flat = not models.turns(model) and sight.room > 0.0 and physics.nz == 1.0
+    return flat and not rubs and schemes.proven(scheme)
 
 
 @njit

@@ -14,11 +14,14 @@ PACKAGE = Path(__file__).parent
 def code_digest(*modules: str) -> str:
     """Return a SHA-256 over the sources of `modules` and of all that they import from this package.
 
-    modules: dotted names, such as "stiffdice.simulate". A change in a figure leaves the digest of the
+    modules: dotted names, such as "stiffdice.simulate". A script in another language that lies beside a module, under
+    its name, is part of it. A change in a figure leaves the digest of the
     simulation as it is, so that only what the change touched is computed again.
     """
     digest = hashlib.sha256()
-    for path in sorted(_closure([_path(name) for name in modules])):
+    sources = _closure([_path(name) for name in modules])
+    scripts = {path.with_suffix(".m") for path in sources}
+    for path in sorted(sources | {path for path in scripts if path.is_file()}):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0")
         digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()

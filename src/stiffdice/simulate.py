@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, phases, requirement, schemes, watch
+from stiffdice import checks, phases, requirement, schemes, simulators, watch, watched_lanes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.criteria import MEMORY, limits_of, open_of, tolerances_of, values
 from stiffdice.criteria import observe as criteria_observe
 from stiffdice.criteria import start as criteria_start
+from stiffdice.criteria.energy import ceiling
 from stiffdice.energy import energies
 from stiffdice.errors import InputError
 from stiffdice.flight import free_steps
@@ -63,11 +64,14 @@ class Run:
     a criterion, in the registry's order; 0 if none did before the end. steps_computed: int64 (member,), those not taken
     at once. evaluations: int64 (member,), of the force. tolerance [1]: of the error, for a scheme that controls its
     own. verdict: int8 (member,), a `Verdict`. end: the last state, shape (member, ...).
+    simulator: what made the run, of which version.
     """
 
     scene: Scene
     model: str
     model_reason: str
+    simulator: str
+    simulator_version: str
     scheme: str
     steps: int
     tolerance: float
@@ -92,11 +96,12 @@ def simulate(
     scene: Scene,
     *,
     model: str = "tumbling",
-    scheme: str = "symplectic_euler",
+    simulator: str = simulators.OURS,
+    scheme: str | None = None,
     steps: int = 10_000,
     tolerance: float = schemes.TOLERANCE,
     every: int | None = None,
-    leap: bool = False,
+    leap: bool | None = None,
     members: Ensemble | None = None,
     criteria: Mapping[str, float] | None = None,
     stop: Mapping[str, float] | None = None,
@@ -106,33 +111,34 @@ def simulate(
 ) -> Run:
     """Run the simulator and return what happened.
 
-    model: `auto` takes the least that is exact for the scene (`requirement.py`). tolerance [1]: of the error, relative
-    to the motion, for a scheme that controls its own; `steps` are then the intervals after which a state is known.
-    every: keep every K-th state, from the launch on. leap: take many steps at once where their motion is known
-    (`flight.py`, `phases.py`), which agrees with stepping to round-off; where no state is kept that is done anyway.
-    members: the launches of an ensemble; None runs the scene's own launch. criteria: tolerances of those that the
-    verdict asks; None asks the default ones. stop: end a run as soon as all of these criteria are decided at these
-    tolerances. references: what `trajectory` compares with, one for all or one for each member (`reference.make`).
-    budget: most steps to compute one by one; a run that needs more ends undecided. progress: called with the fraction
-    done, some times a second.
+    model: `auto` takes the least that is exact for the scene (`requirement.py`). simulator: stiffdice, or one of
+    `peers.ENGINES`, which takes every step, one member after another. scheme: None takes symplectic_euler, or an
+    engine's own. tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are
+    then the intervals after which a state is known. every: keep every K-th state, from the launch on. leap: take many
+    steps at once where their motion is known (`flight.py`, `phases.py`), and the others as fast as can be (`swift.py`),
+    which agrees with stepping as listed to round-off; None does so where no state is kept. members: the launches of an
+    ensemble; None runs the scene's own launch. criteria: tolerances of those that the verdict asks; None asks the
+    default ones. stop: end a run as soon as all of these criteria are decided at these tolerances. references: what
+    `trajectory` compares with, one for all or one for each member (`reference.make`). budget: most steps to compute one
+    by one; a run that needs more ends undecided. progress: called with the fraction done, some times a second.
 
-    Raises InputError for an unknown name, a step count or K out of range, a model that the scene or the scheme does not
-    allow, `auto` for an ensemble, and a trajectory too large to hold.
+    Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
+    engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.
     """
-    checks.choice("scheme", scheme, schemes.SCHEMES)
+    scheme = simulators.scheme_of(simulator, scheme)
     steps = checks.count("steps", steps)
     if model == requirement.AUTO and members is not None:
         raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
     model, model_reason = requirement.chosen(model, [scene], scene.duration / steps)
-    schemes.check_fit(scheme, scene, model)
+    simulators.check_fit(simulator, scheme, scene, model)
     tolerance = checks.number("tolerance", tolerance, "1", above=0)
     if not schemes.FINEST <= tolerance <= schemes.COARSEST:
         raise InputError(
             f"tolerance = {tolerance:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}"
         )
     tolerances = tolerances_of(model, criteria)
-    alone = Ensemble(start_of(scene, model), np.zeros(1))
-    launches, late = alone if members is None else members
+    own = Ensemble(start_of(scene, model), np.zeros(1))
+    launches, late = own if members is None else members
     ensemble = launches.copy()
     count = len(ensemble)
     if every is not None:
@@ -141,46 +147,47 @@ def simulate(
             raise InputError("every: a trajectory is kept of one run, not of an ensemble")
     samples = _room_for(steps, every)
     physics = physics_of(scene)
-    tags = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
     h = scene.duration / steps
     most = steps if budget is None else budget
     watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64))
     watched.memory["limits"] = limits_of({} if stop is None else stop)
     if every is not None:
         samples[0] = ensemble[0]
-    _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, schemes.LAGS[scheme])
+    lag = simulators.lag_of(simulator, scheme)
+    _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, lag)
+    compared = none() if references is None else references
 
-    reached, chunk, longest = 0, 20_000, steps
-    if scheme in schemes.OWN_STEPS:  # of which one may take as long as all before
-        chunk = longest = max(1, min(100, steps // 200))
-    if progress is None:
-        chunk = steps
-    while reached < steps:
-        begun = time.perf_counter()
-        reached = min(steps, reached + chunk)
+    leaping = True if leap or (leap is None and every is None) else None
+
+    def advance(stop: int) -> None:
         _march(
-            *tags,
+            schemes.SCHEMES[scheme],
+            MODELS[model],
+            LAWS[scene.ground.contact],
             physics,
             ensemble,
-            watched.memory,
-            watched.sight,
-            watched.steps_done,
-            watched.steps_computed,
-            watched.evaluations,
-            none() if references is None else references,
-            reached,
+            *watched,
+            compared,
+            stop,
             steps,
             h,
             tolerance,
             most,
             every or 0,
-            leap or every is None,
+            leaping,
             samples,
         )
-        if progress is not None:
-            progress(reached / steps)
-            wanted = chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))
-            chunk = min(longest, int(wanted) + 1)
+
+    if simulator != simulators.OURS:
+        limits = steps, h, tolerance, most, every or 0
+        simulators.driving().march(
+            simulator, scene, model, physics, ensemble, watched, compared, *limits, samples, progress
+        )
+    else:
+        alone = every is not None or progress is not None or budget is not None or references is not None
+        if leaping and not alone and watched_lanes.pays(scene, model, scheme, ensemble):
+            watched_lanes.march(scene, model, physics, ensemble, watched, steps)
+        _in_chunks(advance, steps, scheme, progress)
 
     found = values(watched.memory)
     endings = {
@@ -192,6 +199,8 @@ def simulate(
         scene,
         model,
         model_reason,
+        simulator,
+        simulators.version_of(simulator),
         scheme,
         steps,
         tolerance,
@@ -206,6 +215,25 @@ def simulate(
         ensemble,
         None if every is None else _trajectory(scene, physics, samples, every, steps, int(watched.steps_done[0])),
     )
+
+
+def _in_chunks(
+    advance: Callable[[int], None], steps: int, scheme: str, progress: Callable[[float], None] | None
+) -> None:
+    """Advance to the last step; where progress is to be told, in parts that take a fifth of a second."""
+    if progress is None:
+        advance(steps)
+        return
+    reached, chunk, longest = 0, 20_000, steps
+    if scheme in schemes.OWN_STEPS:  # of which one may take as long as all before
+        chunk = longest = max(1, min(100, steps // 200))
+    while reached < steps:
+        begun = time.perf_counter()
+        reached = min(steps, reached + chunk)
+        advance(reached)
+        progress(reached / steps)
+        wanted = chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))
+        chunk = min(longest, int(wanted) + 1)
 
 
 class Watched(NamedTuple):
@@ -265,13 +293,13 @@ def _march(
     tolerance: float,
     budget: int,
     every: int,
-    leap: bool,
+    leap: Any,
     samples: States,
 ) -> None:
     """Advance every member to step `stop`, watching each step and keeping every K-th.
 
-    leap: motion that is known is taken at once, up to the next sample; past `stop` if it lasts longer, so that where to
-    stop changes nothing.
+    leap: whether motion that is known is taken at once, up to the next sample, and past `stop` if it lasts longer, so
+    that where to stop changes nothing; None if not, which leaves all of that out of what is compiled.
     """
     for m in range(ensemble.shape[0]):
         state, seen, remembered = ensemble[m], sight[m], memory[m]
@@ -280,31 +308,70 @@ def _march(
         done = steps_done[m]
         kept = (done // every + 1) * every if every > 0 else -1  # the step to keep next
         while done < stop and undecided > 0 and remembered.finite[0] == 0.0:
-            flown = skipped = 0
-            if leap:
+            left = budget - steps_computed[m]
+            if leap is not None:
                 most = min(kept, steps) - done if every > 0 else steps - done
-                if reference.horizon >= seen.time:  # it is compared at least as often as the reference is known
-                    most = min(most, 1 + int(reference.spacing / h))
-                flown = free_steps(model, law, physics, state, seen, most)
-                if flown == 0 and steps_computed[m] < budget:
-                    skipped = phases.skip(scheme, model, law, physics, state, seen, most)
-            if flown > 0:
-                schemes.flight(scheme, model, physics, state, h, flown)
-            elif steps_computed[m] >= budget:
-                break
+                taken, flown, computed, evaluated = _leap(
+                    scheme, model, law, physics, state, seen, remembered, reference, most, left, tolerance
+                )
+            elif left > 0:
+                taken, flown, computed = 1, 0, 1
+                evaluated = schemes.step(scheme, model, law, physics, state, h, tolerance)
             else:
-                evaluations[m] += schemes.step(scheme, model, law, physics, state, h, tolerance)
-                steps_computed[m] += 1
-            step = done + skipped + max(1, flown)
+                taken, flown, computed, evaluated = 0, 0, 0, 0
+            if taken == 0:
+                break
+            steps_computed[m] += computed
+            evaluations[m] += evaluated
+            step = done + taken
             watch.observe(seen, physics, state, step, flown)
             undecided -= criteria_observe(remembered, step, seen, law, physics, state, reference)
             if remembered.finite[0] > 0.0:
+                done = step - 1 if computed > 0 else done
                 break
             done = step
             if done == kept:
                 samples[step // every] = state
                 kept += every
         steps_done[m] = done
+
+
+@njit
+def _leap(
+    scheme: Any,
+    model: Any,
+    law: Any,
+    physics: Physics,
+    state: Any,
+    seen: Any,
+    remembered: Any,
+    reference: Any,
+    most: int,
+    left: int,
+    tolerance: float,
+) -> tuple[int, int, int, int]:
+    """Take steps up to the next that must be seen; return how many, in free flight, computed, and force evaluations.
+
+    most: steps at most. left: those that may be computed; where that is none and no other is known, none is taken.
+    """
+    compared = reference.horizon >= seen.time
+    if compared:  # at least as often as the reference is known
+        most = min(most, 1 + int(reference.spacing / seen.step_size))
+    flown = free_steps(model, law, physics, state, seen, most)
+    if flown > 0:
+        schemes.flight(scheme, model, physics, state, seen.step_size, flown)
+        return flown, flown, 0, 0
+    if left <= 0:
+        return 0, 0, 0, 0
+    held = seen.held
+    skipped = phases.skip(scheme, model, law, physics, state, seen, most)
+    most = min(most - skipped, left)
+    # Where the motion is compared, known by phases, or has just come to rest, every step is looked at.
+    if compared or seen.held > held or phases.follows(scheme, model, physics, state, seen):
+        most = 1
+    high, low = ceiling(remembered.energy), phases.rest_of(model, law, physics, seen)
+    taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
+    return skipped + taken, 0, computed, evaluated
 
 
 def _sunk(physics: Physics, ensemble: States, watched: Watched) -> npt.NDArray[np.bool_]:

@@ -6,16 +6,17 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiffdice import catalogue, checks, requirement, schemes
+from stiffdice import catalogue, checks, peers, requirement, simulators
 from stiffdice import scene as scenes
 from stiffdice.criteria import tolerances_of
 from stiffdice.ensemble import phased, turned
-from stiffdice.errors import InputError
+from stiffdice.errors import InputError, NotInstalledError
 from stiffdice.grid import Sweep
 from stiffdice.io import yaml_file
 from stiffdice.state import TURNING, start_of
@@ -33,6 +34,7 @@ class PlannedRun(NamedTuple):
     scene: str
     presets: tuple[str, ...]
     model: str
+    simulator: str
     scheme: str
     steps: int
     every: int
@@ -62,7 +64,11 @@ class PlannedFigure(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """Everything one YAML file in config/ asks for."""
+    """Everything one YAML file in config/ asks for, and what of it is left out: a line for each, and why.
+
+    Left out is what needs an engine that is not installed: runs, sweeps, methods of experiments and timings, and what
+    is drawn or told of these alone.
+    """
 
     name: str
     question: str
@@ -73,6 +79,7 @@ class Study:
     figures: Mapping[str, PlannedFigure]
     tables: Mapping[str, PlannedFigure]
     dpi: int
+    left_out: tuple[str, ...] = ()
 
 
 NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]*")
@@ -89,25 +96,61 @@ def load(path: str | Path, schema: str | Path) -> Study:
     _validate(data, schema, str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
-        runs = {name: _planned_run(name, run) for name, run in data.get("runs", {}).items()}
+        left_out: list[str] = []
+        parts = {
+            "runs": _installed(data, "runs", _planned_run, left_out),
+            "sweeps": _installed(data, "sweeps", partial(_sweep, criteria=data.get("criteria")), left_out),
+            "experiments": _installed(data, "experiments", partial(_experiment, "experiments", left_out), left_out),
+            "timings": _installed(data, "timings", partial(_experiment, "timings", left_out), left_out),
+        }
+        figures = {
+            name: _planned_figure(name, part, data, parts["runs"]) for name, part in data.get("figures", {}).items()
+        }
+        tables = {name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()}
         return Study(
             name=Path(path).stem,
             question=data["question"],
-            runs=runs,
-            sweeps={name: _sweep(name, part, data.get("criteria")) for name, part in data.get("sweeps", {}).items()},
-            experiments={name: _experiment("experiments", name, part) for name, part in _given(data, "experiments")},
-            timings={name: _experiment("timings", name, part) for name, part in _given(data, "timings")},
-            figures={name: _planned_figure(name, part, data, runs) for name, part in data.get("figures", {}).items()},
-            tables={name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()},
+            **parts,
+            figures=_shown("figures", figures, catalogue.DRAWINGS, parts, left_out),
+            tables=_shown("tables", tables, catalogue.TABLES, parts, left_out),
             dpi=int(data.get("dpi", 150)),
+            left_out=tuple(left_out),
         )
     except InputError as error:
         raise error.within(str(path)) from None
 
 
-def _given(data: Mapping[str, Any], kind: str) -> Iterable[tuple[str, Any]]:
-    """Return the parts of one kind that a study names."""
-    return data.get(kind, {}).items()
+def _installed(
+    data: Mapping[str, Any], kind: str, plan: Callable[[str, Any], Any], left_out: list[str]
+) -> dict[str, Any]:
+    """Return the parts of one kind that a study names, planned, without those that need what is not installed."""
+    planned = {}
+    for name, part in data.get(kind, {}).items():
+        try:
+            planned[name] = plan(name, part)
+        except NotInstalledError as error:
+            left_out.append(f"left out: {error}")
+    return planned
+
+
+def _shown(
+    kind: str,
+    planned: Mapping[str, PlannedFigure],
+    entries: Mapping[str, catalogue.Entry],
+    parts: Mapping[str, Mapping[str, Any]],
+    left_out: list[str],
+) -> dict[str, PlannedFigure]:
+    """Return figures or tables of what there is, without those that would have nothing to show."""
+    shown = {}
+    for name, part in planned.items():
+        sources = (part.run,) if part.run is not None else part.of
+        there = tuple(source for source in sources if source in parts[entries[part.draw].given])
+        timings = tuple(source for source in part.timings if source in parts["timings"])
+        if there and bool(timings) == bool(part.timings):
+            shown[name] = part._replace(of=() if part.run is not None else there, timings=timings)
+        else:
+            left_out.append(f"left out: {kind}.{name}: nothing of what it shows is there")
+    return shown
 
 
 def _validate(data: object, schema: str | Path, source: str) -> None:
@@ -153,17 +196,19 @@ def _told(error: Any) -> str:
 
 
 def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
-    planned = PlannedRun(
-        run["scene"],
-        tuple(run.get("presets", ("as_listed", "as_written"))),
-        run["model"],
-        run.get("scheme", "symplectic_euler"),
-        int(run["steps"]),
-        int(run.get("every", 1)),
-    )
-    if planned.every > planned.steps:
-        raise InputError(f"runs.{name}.every = {planned.every}: allowed is a whole number <= steps = {planned.steps}")
+    steps, every, simulator = int(run["steps"]), int(run.get("every", 1)), run.get("simulator", simulators.OURS)
+    if every > steps:
+        raise InputError(f"runs.{name}.every = {every}: allowed is a whole number <= steps = {steps}")
     try:
+        planned = PlannedRun(
+            run["scene"],
+            tuple(run.get("presets", ("as_listed", "as_written"))),
+            run["model"],
+            simulator,
+            simulators.scheme_of(simulator, run.get("scheme")),
+            steps,
+            every,
+        )
         _models_of(planned)
     except InputError as error:
         raise error.within(f"runs.{name}") from None
@@ -176,7 +221,7 @@ def _models_of(run: PlannedRun) -> set[str]:
     for preset in run.presets:
         scene = scenes.load(run.scene, preset=preset)
         model, _ = requirement.chosen(run.model, [scene], scene.duration / run.steps)
-        schemes.check_fit(run.scheme, scene, model)
+        simulators.check_fit(run.simulator, run.scheme, scene, model)
         start_of(scene, model)
         models.add(model)
     return models
@@ -204,8 +249,8 @@ def _planned_figure(
         raise InputError(
             f"figures.{name}.{'of' if planned.of else 'timings'}: {planned.draw} draws a run; name it with `run`"
         )
-    run = runs[_known(f"figures.{name}.run", planned.run, runs, "runs")]
-    if planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
+    run = runs.get(_known(f"figures.{name}.run", planned.run, data.get("runs", {}), "runs"))
+    if run and planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
         raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
     return planned
 
@@ -242,7 +287,8 @@ def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) ->
     return name
 
 
-def _experiment(kind: str, name: str, experiment: Mapping[str, Any]) -> Experiment:
+def _experiment(kind: str, left_out: list[str], name: str, experiment: Mapping[str, Any]) -> Experiment:
+    """Return the plan, its methods without those that are not installed."""
     registry = {"experiments": catalogue.EXPERIMENTS, "timings": catalogue.TIMINGS}[kind]
     planned = Experiment(
         experiment["measure"],
@@ -258,9 +304,27 @@ def _experiment(kind: str, name: str, experiment: Mapping[str, Any]) -> Experime
         checks.known_keys("options", planned.options, known)
         for key, value in planned.options.items():
             _same_kind(f"options.{key}", value, known[key])
+        if "methods" in planned.options:
+            planned.options["methods"] = _installed_of(planned.options["methods"], f"{kind}.{name}", left_out)
     except InputError as error:
         raise error.within(f"{kind}.{name}") from None
     return planned
+
+
+def _installed_of(methods: Sequence[str], where: str, left_out: list[str]) -> list[str]:
+    """Return the methods without engines that are not installed; raises NotInstalledError if none is left."""
+    found, last = [], None
+    for method in methods:
+        try:
+            if method in peers.ENGINES:
+                peers.adapter_of(method, "methods")
+            found.append(method)
+        except NotInstalledError as error:
+            last = error
+            left_out.append(f"left out: {error.within(where)}")
+    if last is not None and not found:
+        raise NotInstalledError("methods: none of them is left")
+    return found
 
 
 def _same_kind(key: str, value: object, default: Any) -> None:
@@ -290,11 +354,11 @@ def _sweep(name: str, sweep: Mapping[str, Any], criteria: Mapping[str, float] | 
 
 def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
     scene = scenes.load(sweep["scene"], sweep.get("set", ()))
-    stiffness = sweep["stiffness"]
+    stiffness, simulator = sweep["stiffness"], sweep.get("simulator", simulators.OURS)
     asked = Sweep(
         scene,
         sweep["model"],
-        sweep.get("scheme", "symplectic_euler"),
+        simulators.scheme_of(simulator, sweep.get("scheme")),
         tuple(sweep["contact"]),
         stiffness if isinstance(stiffness, Mapping) else {"from": stiffness, "to": stiffness, "count": 1},
         sweep.get("steps"),
@@ -306,10 +370,12 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         bool(sweep.get("early_stop", True)),
         float(sweep.get("horizon", scene.duration)),
         int(sweep.get("columns_per_shard", 4)),
+        simulator=simulator,
     )
     model, reason = _model_of(asked)
     planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))
-    schemes.check_fit(planned.scheme, scene, model)
+    for column in planned.columns():
+        simulators.check_fit(simulator, planned.scheme, planned.scene_of(column), model)
     if not planned.criteria:
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
     if planned.horizon > scene.duration:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice import criteria, theory
+from stiffdice import criteria, simulators, theory
 from stiffdice.contact import LAWS
 from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError
@@ -98,6 +98,7 @@ def _run(
     return simulate(
         scene,
         model=sweep.model,
+        simulator=sweep.simulator,
         scheme=sweep.scheme,
         steps=steps,
         members=phased(scene, sweep.model, steps, sweep.members, launches, block),
@@ -157,7 +158,9 @@ def _pattern(sweep: Sweep) -> xr.Dataset:
 
 
 def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
-    attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, "stiffdice.sweep")
+    code = "stiffdice.sweep", *simulators.code_of(sweep.simulator)
+    attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
+    attributes |= layout.simulator_attributes(sweep.simulator, simulators.version_of(sweep.simulator))
     attributes["model_reason"] = sweep.model_reason
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
     attributes["early_stop"] = int(sweep.early_stop)

@@ -13,7 +13,7 @@ from stiffdice.errors import InputError
 from stiffdice.figures.captions import readable
 from stiffdice.io.enums import meanings_of
 from stiffdice.methods import fixed_step
-from stiffdice.peers import PEERS
+from stiffdice.peers import PEERS, SOLVERS
 from stiffdice.problems import PROBLEMS
 from stiffdice.state import Array
 from stiffdice.table import Table, rendered
@@ -197,7 +197,7 @@ _NOTE = (
 
 def _compared(found: Found, stiffness: int, bound: float, *, timed: bool) -> list[str]:
     name, cost = best(found, ours(found.methods), stiffness, bound, timed=timed)
-    peer, peers_cost = best(found, [name for name in found.methods if name in PEERS], stiffness, bound, timed=timed)
+    peer, peers_cost = best(found, [name for name in found.methods if name in SOLVERS], stiffness, bound, timed=timed)
     unit = duration if timed else lambda value: f"{value:,.0f}"
     ratio = f"{peers_cost / cost:.3g}" if cost and math.isfinite(peers_cost / cost) else "—"
     return [
@@ -224,11 +224,11 @@ def targets(data: Mapping[str, xr.Dataset], title: str) -> Table:
             what = "time" if timed else "evaluations"
             costs = _costs(throw, ["event"], 1e-6, timed=timed)
             rows.append([f"event, tumbling throw to 1e-6: growth of {what} over S", "at most 1.5", *_growth(costs)])
-            ratios = _costs(throw, list(PEERS), 1e-6, timed=timed) / costs
+            ratios = _costs(throw, list(SOLVERS), 1e-6, timed=timed) / costs
             rows.append([f"… SciPy's best over it, in {what}", "at least 50" if timed else "", *_range(ratios)])
     if (flat := found.get("flat-bounce")) is not None and "exact" in flat.methods and flat.seconds is not None:
         for bound in (1e-6, 1e-9):
-            ratios = _costs(flat, list(PEERS), bound, timed=True) / _costs(flat, ["exact"], bound, timed=True)
+            ratios = _costs(flat, list(SOLVERS), bound, timed=True) / _costs(flat, ["exact"], bound, timed=True)
             aim = "at least 500"
             rows.append([f"flat bounce to {bound:g}: SciPy's best over exact, in time", aim, *_range(ratios)])
     return rendered(title, ["ratio", "aimed at", "least over S", "most over S"], rows, _NOTE)

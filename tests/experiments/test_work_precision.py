@@ -9,7 +9,7 @@ from stiffdice.errors import InputError
 from stiffdice.experiments import work_precision, work_precision_time
 from stiffdice.io.enums import meanings_of
 from stiffdice.io.write import write_dataset
-from stiffdice.peers import PEERS
+from stiffdice.peers import SOLVERS
 from stiffdice.problems import MEASURES, SAMPLES
 from stiffdice.scene import from_mapping
 
@@ -24,7 +24,7 @@ SCENE = from_mapping(
     "as_written",
 )
 # Others are tried as these are; each would have to be compiled.
-METHODS = ["symplectic_euler", *PEERS]
+METHODS = ["symplectic_euler", *SOLVERS]
 FLAT = {"problem": "flat-bounce", "methods": METHODS, "stiffness": [1e2, 1e8], "per_decade": 1}
 FAST = {**FLAT, "stiffness": [1e2], "affordable": 0.02, "rounds": 1}
 
@@ -74,7 +74,7 @@ def test_the_papers_scheme_is_of_first_order_in_flight_and_needs_steps_as_the_ro
     assert (found.evaluations_computed < 10_000).all()  # flights, and a contact that is known
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", SOLVERS)
 @pytest.mark.parametrize("stiffness", [1e2, 1e8])
 def test_peers_come_near_the_floor_whatever_the_stiffness(flat, peer, stiffness):
     found = rungs(flat, peer, stiffness)

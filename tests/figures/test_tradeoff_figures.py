@@ -7,12 +7,13 @@ from stiffdice import catalogue, figures
 from stiffdice.experiments import work_precision, work_precision_time
 from stiffdice.figures import methods, style
 from stiffdice.io.enums import meanings_of
-from stiffdice.peers import PEERS
+from stiffdice.methods import STEPPING
+from stiffdice.peers import PEERS, SOLVERS
 from stiffdice.scene import from_mapping
 from stiffdice.schemes import SCHEMES
 
 SCENE = from_mapping({"ground": {"damping": 0.1, "friction": 0.1}, "duration": 3.0}, "as_written")
-METHODS = ["symplectic_euler", *PEERS]
+METHODS = ["symplectic_euler", *SOLVERS]
 NAMES = ["work-precision", "work-restitution", "work-energy", "cost", "cost-restitution", "cost-energy"]
 
 
@@ -111,6 +112,6 @@ def test_the_cost_is_drawn_with_the_papers_law_beside(data):
 
 
 def test_every_method_has_a_look_of_its_own():
-    looks = {(methods.look(name)["color"], methods.look(name)["marker"]) for name in [*SCHEMES, *PEERS]}
-    assert len(looks) == len(SCHEMES) + len(PEERS)
+    looks = {(methods.look(name)["color"], methods.look(name)["marker"]) for name in [*SCHEMES, *SOLVERS, *STEPPING]}
+    assert len(looks) == len(SCHEMES) + len(SOLVERS) + len(STEPPING)
     assert (style.QUIET, ".") not in looks

@@ -10,7 +10,7 @@ import pytest
 
 from stiffdice import peers
 from stiffdice.errors import InputError
-from stiffdice.peers import PEERS, Peer, scipy_ivp
+from stiffdice.peers import PEERS, SOLVERS, Peer, scipy_ivp
 from stiffdice.problems import PROBLEMS, SAMPLES, Judge, scene_of
 from stiffdice.provenance import PACKAGE
 from stiffdice.scene import Scene, from_mapping
@@ -28,7 +28,7 @@ def solved(peer, scene, model, tolerance):
     return peers.prepare(peer, scene, model, SAMPLES, tolerance)()
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", SOLVERS)
 @pytest.mark.parametrize("stiffness", [1e2, 1e12])
 def test_a_flat_bounce_is_the_exact_one(peer, stiffness):
     """Against the contact law's own solution, to a hundred times the tolerance: no contact is missed, however short."""
@@ -38,7 +38,7 @@ def test_a_flat_bounce_is_the_exact_one(peer, stiffness):
     assert Judge(flat, scene, path.states).errors(path.states)["restitution"] < 1e-8
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", SOLVERS)
 @pytest.mark.parametrize(("model", "preset"), [("tumbling", "as_written"), ("sliding", "as_listed")])
 def test_the_motion_is_that_of_our_steps_as_these_become_short(peer, model, preset):
     """Of first order; where nodes meet the ground within a step, no smoother than that."""
@@ -80,7 +80,7 @@ def test_the_jacobian_says_how_the_slope_changes():
         np.testing.assert_allclose(jacobian @ way, change, rtol=1e-4, atol=1e-4 * np.abs(change).max())
 
 
-@pytest.mark.parametrize("peer", PEERS)
+@pytest.mark.parametrize("peer", SOLVERS)
 def test_a_finer_tolerance_costs_more_and_is_nearer(peer):
     scene = from_mapping(THROW, "as_written")
     fine, coarse, reference = (solved(peer, scene, "tumbling", tolerance) for tolerance in (1e-8, 1e-3, 1e-11))
@@ -99,8 +99,9 @@ def test_what_fails_is_not_a_number_and_says_no_more():
 def test_a_peer_that_is_not_there_is_told(monkeypatch):
     with pytest.raises(InputError, match=r"peer = euler: allowed is scipy_dop853 or"):
         peers.prepare("euler", Scene(), "sliding", 4, 1e-3)
-    monkeypatch.setitem(PEERS, "engine", Peer(lambda: importlib.import_module("stiffdice_engine"), "x", "Engine"))
-    with pytest.raises(InputError, match="peer = engine: Engine needs the package stiffdice_engine"):
+    engine = Peer(lambda: importlib.import_module("stiffdice_engine"), "Engine", "the package engine", "make it")
+    monkeypatch.setitem(PEERS, "engine", engine)
+    with pytest.raises(InputError, match="peer = engine: needs the package engine, which is not installed; make it"):
         peers.prepare("engine", Scene(), "sliding", 4, 1e-3)
 
 

@@ -87,7 +87,8 @@ class Project:
     def environment(self) -> dict[str, str]:
         # A proxy that is not there: whatever asks the network fails.
         away = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
-        return {**os.environ, **away, "PYTHONPATH": str((self.folder / "src").resolve())}
+        places = [str((self.folder / "src").resolve()), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+        return {**os.environ, **away, "PYTHONPATH": os.pathsep.join(places)}
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -345,6 +346,29 @@ def test_lint_finds_nothing(finished):
         [sys.executable, "-m", "snakemake", "--lint"], cwd=finished.folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
+    """In the same study; what needs one that is not installed is left out with a line."""
+    project, steps = Project(tmp_path), TINY["sweeps"]["steps"]
+    few = {**steps, "stiffness": 1e3, "contact": ["ungated"], "omega_h": {"from": 3.0, "to": 0.5, "count": 8}}
+    sweeps = {"ours": few, "theirs": {**few, "simulator": "numpy"}, "missing": {**few, "simulator": "mujoco"}}
+    figures = {"frontier": {"draw": "frontier", "of": [*sweeps], "title": "Frontier"}}
+    project.plan({"question": "Do they agree?", "sweeps": sweeps, "figures": figures})
+    (tmp_path / "absent").mkdir()
+    (tmp_path / "absent" / "mujoco.py").write_text("raise ModuleNotFoundError")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "absent"))
+    done = project.snakemake("--cores", "2")
+    assert done.returncode == 0, done.stderr
+    told = "stiffdice: left out: sweeps.missing: simulator = mujoco: needs the package mujoco, which is not installed"
+    assert done.stderr.count(told) == 1
+    ours, theirs = (open_file(tmp_path / f"results/tiny/sweeps/{name}/frontier.h5") for name in ("ours", "theirs"))
+    assert np.isfinite(ours.first_pass.values).all()
+    for name in ("first_pass", "last_fail", "flips"):
+        np.testing.assert_array_equal(theirs[name], ours[name])
+    assert (tmp_path / "results/tiny/figures/frontier.svg").exists()
+    assert not (tmp_path / "results/tiny/sweeps/missing").exists()
+    assert project.jobs_due() == {}
 
 
 @pytest.mark.long

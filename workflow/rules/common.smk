@@ -5,6 +5,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
+from stiffdice import runners, simulators
 from stiffdice import study as studies
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.errors import InputError
@@ -35,6 +36,18 @@ def code_of(script, *modules):
     for name in (script, "job.py"):
         digest.update((Path(workflow.basedir) / "workflow" / "scripts" / name).read_bytes())
     return digest.hexdigest()
+
+
+def code_of_runs(script, simulator, *modules):
+    """Return the digest of `code_of` for runs that a simulator makes; of an engine, its version counts, too."""
+    code = code_of(script, *modules, *simulators.code_of(simulator))
+    return code if simulator == simulators.OURS else f"{code} {simulators.version_of(simulator)}"
+
+
+def code_of_measuring(script, planned, registry):
+    """Return the digest of what an experiment or timing depends on, and the versions of the engines that it asks."""
+    code = code_of(script, registry[planned.measure].module, "stiffdice.io.write")
+    return " ".join([code, *runners.attributes(planned.options.get("methods", ())).values()])
 
 
 @cache
@@ -122,9 +135,16 @@ def telling_code(planned):
     return code_of("table.py", TABLES[planned.draw].module, "stiffdice.io.read", "stiffdice.io.write")
 
 
+@cache
+def tell_left_out(name):
+    for line in study(name).left_out:
+        print(f"stiffdice: {line}", file=sys.stderr)
+
+
 def everything_of(name):
-    """Return all results of a study."""
+    """Return all results of a study; what needs an engine that is not installed is left out, with a line."""
     planned = study(name)
+    tell_left_out(name)
     files = [file for figure in planned.figures for file in figure_files(name, figure)]
     files += [f"results/{name}/runs/{run}.{preset}.h5" for run in planned.runs for preset in planned.runs[run].presets]
     for sweep in planned.sweeps:

@@ -8,9 +8,7 @@ rule experiment:
         "results/{study}/experiments/{experiment}.h5",
     params:
         experiment=lambda wildcards: planned_experiment(wildcards),
-        code=lambda wildcards: code_of(
-            "experiment.py", EXPERIMENTS[planned_experiment(wildcards).measure].module, "stiffdice.io.write"
-        ),
+        code=lambda wildcards: code_of_measuring("experiment.py", planned_experiment(wildcards), EXPERIMENTS),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
     benchmark:
@@ -33,9 +31,7 @@ rule timing:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
         experiment=lambda wildcards: planned_timing(wildcards),
-        code=lambda wildcards: code_of(
-            "timing.py", TIMINGS[planned_timing(wildcards).measure].module, "stiffdice.io.write"
-        ),
+        code=lambda wildcards: code_of_measuring("timing.py", planned_timing(wildcards), TIMINGS),
     log:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:

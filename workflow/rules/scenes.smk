@@ -8,7 +8,13 @@ rule trajectory:
         "results/{study}/runs/{run}.{preset}.h5",
     params:
         run=lambda wildcards: planned_run(wildcards),
-        code=code_of("trajectory.py", "stiffdice.io.layout", "stiffdice.ledger", "stiffdice.io.write"),
+        code=lambda wildcards: code_of_runs(
+            "trajectory.py",
+            planned_run(wildcards).simulator,
+            "stiffdice.io.layout",
+            "stiffdice.ledger",
+            "stiffdice.io.write",
+        ),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",
     benchmark:

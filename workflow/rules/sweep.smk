@@ -9,7 +9,7 @@ rule shard:
         # Snakemake compares plain data only; that `sweep` changed it learns from the shard's name.
         sweep=lambda wildcards: planned_sweep(wildcards),
         columns=lambda wildcards: shards_of(wildcards.study, wildcards.sweep)[wildcards.shard],
-        code=code_of("shard.py", "stiffdice.sweep"),
+        code=lambda wildcards: code_of_runs("shard.py", planned_sweep(wildcards).simulator, "stiffdice.sweep"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
     benchmark:

@@ -9,6 +9,7 @@ from stiffdice import scene as scenes
 from stiffdice.io.layout import run_dataset
 from stiffdice.io.write import write_dataset
 from stiffdice.simulate import simulate
+from stiffdice.simulators import OURS
 
 snakemake: Any  # Snakemake puts it here
 
@@ -17,9 +18,16 @@ with logged(snakemake.log[0]) as say:
     scene = scenes.load(planned.scene, preset=preset)
     watch = Stopwatch()
     with watch.running():
-        run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=planned.steps, every=planned.every)
+        run = simulate(
+            scene,
+            model=planned.model,
+            simulator=planned.simulator,
+            scheme=planned.scheme,
+            steps=planned.steps,
+            every=planned.every,
+        )
         dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
-        if planned.scheme in ledger.BOOKED:
+        if planned.simulator == OURS and planned.scheme in ledger.BOOKED:
             books = ledger.keep(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
             dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, snakemake.output[0])

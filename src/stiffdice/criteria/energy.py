@@ -24,6 +24,10 @@ BY_DEFAULT, FOR_TURNING = True, True
 SLOTS = 3  # largest ratio so far, energy at launch [J], what a gain is measured by [J]
 
 
+# Of the energies: as much as a flight of many steps may add by it, and far below any gain that matters.
+_ROUND_OFF = 1e-12
+
+
 @njit
 def start(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
@@ -44,6 +48,12 @@ def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, refe
     if sight.flight > 0.0:
         slots[0] = max(slots[0], 1.0 + (_flying(sight, physics, state) - slots[1]) / slots[2])
     return slots[0], sight.held > 0.0
+
+
+@njit
+def ceiling(slots: Any) -> float:
+    """Return up to which energy in the air [J] the measure stays what it is, to round-off."""
+    return slots[1] + (slots[0] - 1.0) * slots[2] + _ROUND_OFF * (abs(slots[1]) + slots[2])
 
 
 @njit

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks, schemes, theory
+from stiffdice import checks, runners, schemes, theory
 from stiffdice.io import layout
 from stiffdice.io.enums import enum_attributes
 from stiffdice.methods import (
@@ -42,9 +42,6 @@ REFERENCES: dict[str, Effort] = (
     | {name: Effort(SAMPLES, schemes.FINEST) for name in sorted(CONTROLLED)}  # finer than any rung
     | {"scipy_dop853": Effort(0, 1e-13), "scipy_lsoda": Effort(0, FINE)}
 )
-
-# An evaluation by a peer, most of it spent between languages, takes about as long as so many of ours.
-_DEARER = 100
 
 # So many first rungs may be too dear.
 _TRIES = 2
@@ -77,8 +74,8 @@ def measure(
 
     problem: a name of PROBLEMS. methods: names of schemes and peers. stiffness [kg/s²]. per_decade: efforts in a decade
     of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made;
-    where flights, or contacts that are known, are taken at once, a run may have many more. A peer's ladder ends at a
-    hundredth of it.
+    where flights, or contacts that are known, are taken at once, a run may have many more. A peer's ladder ends at its
+    part of it (`runners.DEARER`).
     `evaluations` are those of plain stepping, `evaluations_computed` those made. `agreement` has the difference of each
     reference from the first, `floor` what half a unit in the last place grows to: in the launch, and in the place
     during a contact, where it is one of the depth.
@@ -107,6 +104,7 @@ def measure(
         "samples": SAMPLES,
         "reference": sources[0],
     }
+    attributes |= runners.attributes(names)
     return xr.Dataset(
         _variables(found) | _reference_variables(agreement, floor),
         layout.method_coordinates(grounds, names)
@@ -128,10 +126,12 @@ def _climbed(
     """
     rungs: list[Rung] = []
     too_dear = 0
-    most = budget / (_DEARER if method in PEERS else 1)
+    most = budget / runners.dearness(method)
     growth = 10 ** (1 / per_decade) if fixed_step(method) else 1.0  # known beforehand
     for effort in ladder(scene, method, per_decade, steps):
         if len(rungs) > 1 and rungs[-1].path.computed * growth > most:
+            break
+        if method in PEERS and effort.steps > most:  # an engine takes every one of them
             break
         path = path_of(problem, scene, method, effort, budget)
         if path.computed >= most:

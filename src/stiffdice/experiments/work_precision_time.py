@@ -9,20 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks
+from stiffdice import checks, runners
 from stiffdice.io import layout
 from stiffdice.methods import ALL, Effort, chosen_from, fixed_step, ladder, plain
+from stiffdice.peers import ENGINES
 from stiffdice.problems import PROBLEMS, SAMPLES, Problem, scene_of
 from stiffdice.scene import Scene
-from stiffdice.stepping import Path
-from stiffdice.timing import Times, interleaved, machine, seconds_of
+from stiffdice.state import start_of
+from stiffdice.timing import Launched, Times, interleaved, machine, seconds_of
 
 
 class Rung(NamedTuple):
     """One run on a ladder, and how long its first call took [s]."""
 
     effort: Effort
-    run: Callable[[], Path]
+    run: Callable[[], object]
     first: float
 
 
@@ -68,6 +69,7 @@ def time(
         "method",
         "stiffdice.experiments.work_precision_time",
     ) | {"problem": problem, "samples": SAMPLES, "rounds": rounds}
+    attributes |= runners.attributes(names)
     first = [rungs[0].first for rungs in climbed[0]]
     variables = _variables(climbed, times, names) | {
         "first_seconds": ("method", first, {"long_name": "first call in a fresh process", "units": "s"}),
@@ -82,7 +84,7 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
     for effort in ladder(scene, method, per_decade, math.inf):
         if fixed_step(method) and rungs and took * effort.steps / rungs[-1].effort.steps > affordable:
             break
-        run = plain(problem, scene, method, effort)
+        run = _timed(problem, scene, method, effort)
         first = took = seconds_of(run)
         if not rungs:  # it may have compiled
             took = seconds_of(run)
@@ -90,6 +92,14 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
         if took > _END * affordable:
             break
     return rungs[-_RUNGS:] if fixed_step(method) else rungs
+
+
+def _timed(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], object]:
+    """Return a run to be timed; an engine builds its model of the scene before."""
+    if method not in ENGINES:
+        return plain(problem, scene, method, effort)
+    launch = start_of(scene, problem.model)
+    return Launched(runners.ready(method, scene, problem.model, launch, effort.steps, SAMPLES))
 
 
 def _variables(

@@ -120,7 +120,7 @@ def _of_the_paper(scan: xr.Dataset) -> bool:
 
 def _named(scan: xr.Dataset) -> str:
     ground = json.loads(scan.attrs["scene"])["ground"]
-    law = style.LAW_NAMES[meanings_of(scan.cell_contact)[int(scan.cell_contact[0])]]
+    law = style.LAW_NAMES[meanings_of(scan.cell_contact)[int(scan.cell_contact[0])]] + style.maker_of(scan)
     passed = _criteria(scan)[1]
     return (
         f"{law}, S = {captions.readable(float(scan.cell_stiffness[0]))} kg/s², "

@@ -32,7 +32,7 @@ def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=7.4)
     panels = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
     for (upper, lower), frontier in zip(panels.T, columns, strict=True):
-        law = style.LAW_NAMES[meanings_of(frontier.contact)[int(frontier.contact)]]
+        law = style.LAW_NAMES[meanings_of(frontier.contact)[int(frontier.contact)]] + style.maker_of(frontier)
         upper.set_title(law if len(sweeps) == 1 else f"{_MODELS[frontier.attrs['model']]}, {law}")
         _steps(upper, frontier)
         _omega_h(lower, frontier)

@@ -20,6 +20,12 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "scipy_dop853": {"color": style.QUIET, "marker": "<"},
     "scipy_lsoda": {"color": style.INK, "marker": ">"},
     "scipy_radau": {"color": "#a9a9a9", "marker": "x"},
+    "mujoco": {"color": style.BLUE, "marker": "d"},
+    "pybullet": {"color": style.ORANGE, "marker": "h"},
+    "drake": {"color": style.PURPLE, "marker": "p"},
+    "scipy": {"color": style.INK, "marker": ">"},
+    "octave": {"color": style.GREEN, "marker": "X"},
+    "numpy": {"color": style.VERMILION, "marker": "+"},
 }
 
 

@@ -127,6 +127,6 @@ def _theory(panel: Any, found: xr.Dataset, *, numbered: bool) -> None:
 def _named(found: xr.Dataset) -> str:
     """Return what one column shows, in two lines."""
     ground = json.loads(found.attrs["scene"])["ground"]
-    law = style.LAW_NAMES[meanings_of(found.contact)[int(found.contact)]]
+    law = style.LAW_NAMES[meanings_of(found.contact)[int(found.contact)]] + style.maker_of(found)
     damping, friction = captions.readable(ground["damping"]), captions.readable(ground["friction"])
     return f"{found.attrs['model']}, {law}\nD = {damping} kg/s, μ = {friction}"

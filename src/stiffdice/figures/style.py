@@ -110,6 +110,12 @@ def add_note(figure: Figure, text: str) -> None:
     figure.supxlabel(text, x=0.01, ha="left", fontsize=7.5, color=QUIET)
 
 
+def maker_of(found: Any) -> str:
+    """Return who made the runs of a sweep, to come after its contact law; nothing if we did."""
+    simulator = found.attrs["simulator"]
+    return "" if simulator == "stiffdice" else f", {simulator}"
+
+
 def borders(centres: npt.NDArray[np.float64], *, logarithmic: bool = False) -> npt.NDArray[np.float64]:
     """Return the borders of cells that reach half-way to their neighbours, sorted as `centres`, shape (cell + 1,).
 

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from stiffdice import engine_notes
 from stiffdice.figures import captions, methods, style
 from stiffdice.io.enums import meanings_of
 from stiffdice.problems import PROBLEMS
 from stiffdice.tradeoff import Found, found_in
 
-# So many stiffnesses are drawn, from the softest to the stiffest.
+# So many stiffnesses are drawn at most, from the softest to the stiffest.
 _COLUMNS = 3
 _ERRORS = {
     "position": "position error, RMS [r]",
@@ -45,13 +46,16 @@ def energy(data: Mapping[str, xr.Dataset], title: str) -> Figure:
 def _drawn(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
     rows = found_in(data.values())
     figure = style.new_figure(title, width=12.0, height=3.1 * len(rows) + 1.4)
-    panels = figure.subplots(len(rows), _COLUMNS, sharex="row", sharey="row", squeeze=False)
+    columns = min(_COLUMNS, max(found.data.sizes["stiffness"] for found in rows))
+    panels = figure.subplots(len(rows), columns, sharex="row", sharey="row", squeeze=False)
     for line, found in zip(panels, rows, strict=True):
-        shown = np.linspace(0, found.data.sizes["stiffness"] - 1, _COLUMNS).round().astype(int)
+        shown = np.linspace(0, found.data.sizes["stiffness"] - 1, columns).round().astype(int)
         for panel, stiffness in zip(line, shown, strict=True):
             _panel(panel, found, int(stiffness), measure)
         line[0].set_ylabel(_ERRORS[measure])
-    figure.legend(handles=_legend(rows), loc="outside lower center", ncols=6)
+    told = engine_notes.line(found.data for found in rows)
+    words: dict[str, Any] = {"title": told, "title_fontsize": 7.5} if told else {}
+    figure.legend(handles=_legend(rows), loc="outside lower center", ncols=6, **words)
     return figure
 
 

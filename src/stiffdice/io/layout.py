@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice import __version__, theory
+from stiffdice import __version__, simulators, theory
 from stiffdice.contact import LAWS
 from stiffdice.criteria import CRITERIA
 from stiffdice.cube import SIGNS
@@ -85,22 +85,27 @@ def run_variables(members: int) -> dict[str, Any]:
     }
 
 
-def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, code: str) -> dict[str, Any]:
+def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, *code: str) -> dict[str, Any]:
     """Return the global attributes that say what made a file; nothing that two rebuilds would not share.
 
-    code: the module whose numbers the file holds.
+    code: the modules whose numbers the file holds.
     """
     return {
         "Conventions": "CF-1.11",
         "title": title,
         "format_version": FORMAT_VERSION,
         "stiffdice_version": __version__,
-        "code_digest": code_digest(code),
+        "code_digest": code_digest(*code),
         "scene": json.dumps(scene.as_mapping(), sort_keys=True),
         "scene_digest": scene.digest,
         "model": model,
         "scheme": scheme,
     }
+
+
+def simulator_attributes(simulator: str, version: str) -> dict[str, str]:
+    """Return the attributes that say who made the runs of a file, and of which version."""
+    return {"simulator": simulator, "simulator_version": version}
 
 
 def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
@@ -124,7 +129,9 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     variables["verdict"] = ((), run.verdict[0], VERDICT_ATTRIBUTES)
     variables["steps_done"] = ((), run.steps_done[0], STEPS_DONE_ATTRIBUTES)
     variables["evaluations"] = ((), run.evaluations[0], EVALUATIONS_ATTRIBUTES)
-    attributes = provenance_attributes(title, run.scene, run.model, run.scheme, "stiffdice.simulate") | {
+    code = "stiffdice.simulate", *simulators.code_of(run.simulator)
+    attributes = provenance_attributes(title, run.scene, run.model, run.scheme, *code)
+    attributes |= simulator_attributes(run.simulator, run.simulator_version) | {
         "model_reason": run.model_reason,
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,

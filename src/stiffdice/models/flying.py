@@ -24,6 +24,7 @@ drift = tumbling.drift
 turn = tumbling.turn
 turns = tumbling.turns
 extent = tumbling.extent
+rises_only = tumbling.rises_only
 
 
 @njit

@@ -12,6 +12,9 @@ the setting that was fastest for it at equal error, out of those tried (throw to
   S = 10⁸. Each counts as as many evaluations as it makes.
 - Absolute tolerances are 0.01 of the relative one times a natural size of each component: the radius, the speed √(2E/m)
   and the angular momentum √(2EI) of the launch's energy E, and one. Factors from 1 to 10⁻⁴ gave the same curve.
+
+As an engine (`simulator: scipy`) it is LSODA, which tells the state after each of our steps between its own; each
+`advance` goes on from where the last one ended, in a new integration.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import scipy
 from scipy.integrate import ode, odeint, solve_ivp
 
 from stiffdice import checks, models
@@ -33,6 +37,9 @@ from stiffdice.models import MODELS
 from stiffdice.scene import Scene
 from stiffdice.state import STATE, TURNING, Array, Physics, States, physics_of, start_of
 from stiffdice.stepping import Path
+
+LAG = 0.0
+SCHEME = "lsoda"
 
 # The absolute tolerance of each component, in units of the relative one and of the component's natural size.
 ABSOLUTE = 0.01
@@ -151,26 +158,77 @@ def prepare(scene: Scene, model: str, method: str, samples: int, tolerance: floa
     checks.choice("model", model, MODELS)
     tolerance = checks.number("tolerance", tolerance, "1", above=0)
     times = np.linspace(0.0, scene.duration, checks.count("samples", samples) + 1)
-    start, sizes = _start(scene, model), _sizes(scene, model)
-    nodes = start_of(scene, model)["node_offset"]
-    numbers: Array = np.array([*physics_of(scene), *nodes.ravel()])
-    given = *equations(model, scene.ground.contact), numbers, np.zeros(1, STATE)
+    sizes, launch = _sizes(scene, model), start_of(scene, model)
+    given = _given(scene, model, launch)
 
     def run() -> Path:
-        with warnings.catch_warnings():  # a run that fails is a result
-            warnings.simplefilter("ignore")
-            solution, evaluations = solve(start, times, tolerance, sizes, given)
-        whole = np.full((len(times), len(start)), np.nan)
-        whole[: len(solution)] = solution
+        solution, evaluations = _solved(solve, _start(launch, model), times, tolerance, sizes, given)
         states = np.zeros(len(times), STATE)
-        _states(MODELS[model], numbers, whole, states)
+        _states(MODELS[model], given[2], solution, states)
         return Path(states, evaluations, evaluations)
 
     return run
 
 
-def _start(scene: Scene, model: str) -> Array:
-    (launch,) = start_of(scene, model)
+def unfit(scene: Scene, model: str) -> str | None:
+    """Return None: every scene and model can be represented."""
+    return None
+
+
+def versions() -> str:
+    """Return the engine's name and version."""
+    return f"scipy {scipy.__version__}"
+
+
+def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> Lsoda:
+    """Return a run of LSODA from a launch, shape (1,), told every h [s]; tolerance [1]: SciPy's rtol."""
+    return Lsoda(scene, model, launch, h, tolerance)
+
+
+class Lsoda:
+    """One run, standing where `advance` left it."""
+
+    def __init__(self, scene: Scene, model: str, launch: States, h: float, tolerance: float) -> None:
+        """Take the scene's numbers, and the state of the launch, shape (1,)."""
+        self._model, self._h, self._tolerance = model, h, tolerance
+        self._sizes, self._given, self._y = _sizes(scene, model), _given(scene, model, launch), _start(launch, model)
+
+    def advance(self, states: States, every: int) -> int:
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
+        times: Array = self._h * every * np.arange(len(states) + 1.0)
+        solution, evaluations = _solved(_lsoda, self._y, times, self._tolerance, self._sizes, self._given)
+        _states(MODELS[self._model], self._given[2], solution[1:], states)
+        self._y = solution[-1]
+        return evaluations
+
+
+def _solved(
+    solve: Callable[[Array, Array, float, Array, Given], Solution],
+    start: Array,
+    times: Array,
+    tolerance: float,
+    sizes: Array,
+    given: Given,
+) -> Solution:
+    """Return what a method of METHODS finds, shape (time, component): not-a-number from where it fails on."""
+    whole = np.full((len(times), len(start)), np.nan)
+    if not np.isfinite(start).all():
+        return whole, 0
+    with warnings.catch_warnings():  # a run that fails is a result
+        warnings.simplefilter("ignore")
+        solution, evaluations = solve(start, times, tolerance, sizes, given)
+    whole[: len(solution)] = solution
+    return whole, evaluations
+
+
+def _given(scene: Scene, model: str, launch: States) -> Given:
+    """Return what the equations of motion of a scene and model need besides the time and the solution."""
+    numbers: Array = np.array([*physics_of(scene), *launch["node_offset"].ravel()])
+    return *equations(model, scene.ground.contact), numbers, np.zeros(1, STATE)
+
+
+def _start(launches: States, model: str) -> Array:
+    (launch,) = launches
     parts = [launch["position"], launch["velocity"]]
     if model in TURNING:
         parts += [[1.0, 0.0, 0.0, 0.0], launch["angular_momentum"]]

@@ -1,7 +1,8 @@
 """Time-stepping schemes. A scheme is a module with TAG, LAG, `step` and `flight`; one line registers it.
 
 It may also have a `swing`, and say that what `phases.py` takes at once is `proven` for it; otherwise those of
-`closed.py` stand for it, and its contacts are stepped. One that does not apply to every scene and model also has
+`closed.py` stand for it, and its contacts are stepped. One that has a `stretch` takes steps until there is something
+to see; the others one at a time. One that does not apply to every scene and model also has
 `unfit(scene, model)`, which says why not.
 """
 
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from stiffdice.compiled import by_tag
+from stiffdice.compiled import by_tag, njit
 from stiffdice.errors import InputError
 from stiffdice.scene import Scene
 from stiffdice.schemes import (
@@ -45,6 +46,26 @@ def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:
 # (scheme, model, law, physics, state, h, tolerance) -> force evaluations, or pieces in closed form: advance `state` by
 # one step of h [s]. Only a scheme that controls its own error looks at the tolerance [1] of it.
 step = _chosen("step")
+
+
+def _one_step(module: Any) -> Any:
+    """Return what stands for the `stretch` of a scheme that has none."""
+    step = module.step
+
+    @njit
+    def one(
+        model: Any, law: Any, physics: Any, state: Any, sight: Any, high: Any, low: Any, most: Any, tolerance: Any
+    ) -> tuple[int, int, int]:
+        return 1, 1, step(model, law, physics, state, sight.step_size, tolerance)
+
+    return one
+
+
+# (scheme, model, law, physics, state, sight, high, low, most, tolerance) -> steps, those computed, force evaluations:
+# advance `state` by steps that need not be looked at and one that does, at most `most`, as `swift.py` says.
+stretch = by_tag(
+    {type(module.TAG): getattr(module, "stretch", None) or _one_step(module) for module in _MODULES.values()}
+)
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
 flight = _chosen("flight")
