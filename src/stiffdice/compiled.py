@@ -105,19 +105,20 @@ def njit(*function: Any, **options: Any) -> Any:
     return part(*function) if function else part
 
 
-def by_tag(bodies: dict[type, Any]) -> Callable[..., Any]:
+def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:
     """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
     The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body is
     chosen at compile time, which costs nothing in a loop; unlike functions passed as arguments it leaves the kernel
     cacheable on disk, and unlike string literals it does not slow down every call of the kernel (1 µs against 11 ms,
-    numba 0.68). The body gets the arguments after the tag.
+    numba 0.68). The body gets the arguments after the tag. inlined: put what chooses into its caller, whatever its
+    size: right for a body that is put there itself, and else only longer to compile.
     """
 
     def call(tag: Any, *arguments: Any) -> Any:
         raise TypeError("a kernel's part: call it from compiled code")
 
-    @overload(call, strict=False, jit_options={"forceinline": True})
+    @overload(call, strict=False, jit_options={"forceinline": inlined})
     def _choose(tag: Any, *arguments: Any) -> Any:
         body = bodies[tag.instance_class]
         return lambda tag, *arguments: body(*arguments)

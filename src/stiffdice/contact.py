@@ -44,8 +44,8 @@ def _ungated_reaches(clearance: float) -> bool:
 
 
 @njit
-def _ungated_acts(clearance: Any, speed: float) -> bool:
-    return clearance <= 0.0 or speed < 0.0
+def _ungated_acts(touching: Any, speed: float) -> bool:
+    return touching or speed < 0.0
 
 
 @njit
@@ -69,8 +69,8 @@ def _gated_reaches(clearance: float) -> bool:
 
 
 @njit
-def _gated_acts(clearance: Any, speed: float) -> bool:
-    return clearance <= 0.0
+def _gated_acts(touching: Any, speed: float) -> bool:
+    return bool(touching)
 
 
 # (law, depth, speed, stiffness, damping) -> the magnitude of the normal force on a node [N]. depth [m]: distance below
@@ -84,8 +84,8 @@ normal_slopes = by_tag({Ungated: _ungated_slopes, Gated: _gated_slopes})
 # (law, clearance) -> whether the law can act on a body whose every node is at least `clearance` [m] above the ground.
 reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})
 
-# (law, clearance, speed) -> whether the law can act on a body in that place [m] whose every node moves away from the
-# ground at `speed` [m/s] at least.
+# (law, touching, speed) -> whether the law can act on a body; touching: whether a node does; speed [m/s]: at least so
+# fast every node moves away from the ground.
 acts = by_tag({Ungated: _ungated_acts, Gated: _gated_acts})
 
 

@@ -6,8 +6,7 @@ differences, two by two. The rotation of a step (equation 9) is E + s A + v A²,
 and v are polynomials in its square. So a step branches nowhere and calls nothing that a vector unit cannot do; a member
 that turns by more than a radian in a step is turned by itself.
 
-What comes out agrees with `stepping.py` to round-off, not to the last bit: sums are made in another order, and products
-are fused with them.
+What comes out agrees with `stepping.py` to round-off, not to the last bit: sums are made in another order.
 """
 
 from __future__ import annotations
@@ -162,7 +161,7 @@ def _gated_push(depth: Any, drag: Any, stiffness: float) -> Any:
 
 
 # (law, depth, drag, stiffness) -> the normal force on a node [N], as `contact.normal_force`; drag [N]: damping × speed.
-_push = by_tag({Ungated: _ungated_push, Gated: _gated_push})
+push = by_tag({Ungated: _ungated_push, Gated: _gated_push}, inlined=True)
 
 
 @inlined
@@ -170,12 +169,12 @@ def _flat_push(law: Any, k: Numbers, height: Any, speed: Any, levels: Vector) ->
     half = max(abs(levels.x), abs(levels.y))
     half = max(half, abs(levels.z))
     stiffness, drag = 4.0 * k.stiffness, (4.0 * k.damping) * speed  # of the four nodes of a face
-    return _push(law, half - height, drag, stiffness) + _push(law, -half - height, drag, stiffness)
+    return push(law, half - height, drag, stiffness) + push(law, -half - height, drag, stiffness)
 
 
 @inlined
 def _edge_push(law: Any, k: Numbers, height: Any, drag: Any, level: Any, c: Any) -> Any:
-    return _push(law, (level - c) - height, drag, k.stiffness) + _push(law, (level + c) - height, drag, k.stiffness)
+    return push(law, (level - c) - height, drag, k.stiffness) + push(law, (level + c) - height, drag, k.stiffness)
 
 
 @inlined
@@ -190,7 +189,7 @@ def _tilted_push(law: Any, k: Numbers, height: Any, speed: Any, levels: Vector) 
 
 
 # (posture, law, k, height, speed, levels) -> the normal force on all nodes of a cube that does not turn [N].
-_whole_push = by_tag({Flat: _flat_push, Tilted: _tilted_push})
+_whole_push = by_tag({Flat: _flat_push, Tilted: _tilted_push}, inlined=True)
 
 
 @inlined
@@ -222,9 +221,9 @@ def _slide(posture: Any, law: Any, k: Numbers, body: Moving) -> Moving:
 @inlined
 def _node(law: Any, k: Numbers, height: Any, velocity: Vector) -> Vector:
     """Return the force on one node [N], without its weight."""
-    push = _push(law, -height, k.damping * velocity.z, k.stiffness)
-    grip = _grip(k, push, velocity)
-    return Vector(grip * velocity.x, grip * velocity.y, push)
+    pressed = push(law, -height, k.damping * velocity.z, k.stiffness)
+    grip = _grip(k, pressed, velocity)
+    return Vector(grip * velocity.x, grip * velocity.y, pressed)
 
 
 @inlined
@@ -309,7 +308,7 @@ def _tumble(posture: Any, law: Any, k: Numbers, body: Turning) -> Turning:
 
 
 # (model, posture, law, k, body) -> the state one step later, but for the turn of members of which `unturned` tells.
-step = by_tag({Vertical: _rise, Sliding: _slide, Tumbling: _tumble})
+step = by_tag({Vertical: _rise, Sliding: _slide, Tumbling: _tumble}, inlined=True)
 
 
 @inlined
@@ -323,7 +322,7 @@ def _unturned(k: Numbers, body: Turning) -> int:
 
 
 # (model, k, body) -> which members the last step has not turned, as they turn by more than a radian; lane j is bit j.
-unturned = by_tag({Vertical: _none_unturned, Sliding: _none_unturned, Tumbling: _unturned})
+unturned = by_tag({Vertical: _none_unturned, Sliding: _none_unturned, Tumbling: _unturned}, inlined=True)
 
 
 @njit
@@ -357,7 +356,7 @@ def _tumbling_row(block: Array, row: int) -> Any:
 
 
 # (model, block, row) -> a row of a block, as wide as the model has it.
-row_of = by_tag({Vertical: _vertical_row, Sliding: _sliding_row, Tumbling: _tumbling_row})
+row_of = by_tag({Vertical: _vertical_row, Sliding: _sliding_row, Tumbling: _tumbling_row}, inlined=True)
 
 
 @inlined
@@ -404,7 +403,7 @@ def _read_turning(block: Array) -> Turning:
 
 
 # (model, block) -> the state of a block's members.
-read = by_tag({Vertical: _read_rising, Sliding: _read_moving, Tumbling: _read_turning})
+read = by_tag({Vertical: _read_rising, Sliding: _read_moving, Tumbling: _read_turning}, inlined=True)
 
 
 @inlined
@@ -431,7 +430,7 @@ def _write_turning(block: Array, body: Turning) -> None:
 
 
 # (model, block, body): put the state of a block's members back.
-write = by_tag({Vertical: _write_rising, Sliding: _write_moving, Tumbling: _write_turning})
+write = by_tag({Vertical: _write_rising, Sliding: _write_moving, Tumbling: _write_turning}, inlined=True)
 
 
 @njit
@@ -493,7 +492,7 @@ def _leave_turning(axes: Array, block: Array, lane: int, state: Any) -> None:
 
 
 # (model, axes, block, lane, state): put what a step changes of a member into its STATE record.
-leave = by_tag({Vertical: _leave_rising, Sliding: _leave_moving, Tumbling: _leave_turning})
+leave = by_tag({Vertical: _leave_rising, Sliding: _leave_moving, Tumbling: _leave_turning}, inlined=True)
 
 
 @njit(cache=True, nogil=True)

@@ -2,11 +2,11 @@
 
 Code on such numbers reads as code on floats. LLVM keeps them in vector registers and splits them into as many as the
 processor has in width, so that nothing hangs on whether a loop was found fit to be vectorised, and what a member gets
-does not depend on its place among the others. A product may be fused with a sum (`contract`), nothing else may be
-rearranged: infinities and not-a-number behave as ever.
+does not depend on its place among the others. Nothing is fused or rearranged: numbers are the same on every processor,
+and infinities and not-a-number behave as ever.
 
-In compiled code only: `load`, `store`, `where`, `bits`, `every_lane`; `+ − * /`, comparisons, `& | ^ ~`, `abs`, `max`,
-`math.sqrt`. A comparison gives a mask.
+In compiled code only: `load`, `store`, `of_three`, `lane`, `total`, `where`, `bits`; `+ − * /`, comparisons,
+`& | ^ ~`, `abs`, `max`, `math.sqrt`. A comparison gives a mask.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ lower_builtin: Any = _lower_builtin
 cgutils: Any = _cgutils
 
 _DOUBLE = ir.DoubleType()
-_FUSED = ("contract",)
 
 
 class Lanes(types.Type):
@@ -120,9 +119,9 @@ def _call(name: str) -> Callable[..., Any]:
     return build
 
 
-_define(operator.add, 2, lambda builder, a, b: builder.fadd(a, b, flags=_FUSED))
-_define(operator.sub, 2, lambda builder, a, b: builder.fsub(a, b, flags=_FUSED))
-_define(operator.mul, 2, lambda builder, a, b: builder.fmul(a, b, flags=_FUSED))
+_define(operator.add, 2, lambda builder, a, b: builder.fadd(a, b))
+_define(operator.sub, 2, lambda builder, a, b: builder.fsub(a, b))
+_define(operator.mul, 2, lambda builder, a, b: builder.fmul(a, b))
 _define(operator.truediv, 2, lambda builder, a, b: builder.fdiv(a, b))
 _define(operator.neg, 1, lambda builder, a: builder.fneg(a))
 _define(abs, 1, _call("fabs"))
@@ -172,15 +171,46 @@ def store(typing: Any, array: Any, row: Any, value: Any) -> Any:
     return types.void(array, row, value), build
 
 
-@intrinsic(prefer_literal=True)
-def every_lane(typing: Any, value: Any, width: Any) -> Any:
-    """Return a number in every lane."""
-    result = Lanes(width.literal_value)
+@intrinsic
+def of_three(typing: Any, a: Any, b: Any, c: Any) -> Any:
+    """Return three numbers as four lanes, the last of them zero."""
+    result = Lanes(4)
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return _splat(context, builder, args[0], types.float64, result.width)
+        vector = ir.Constant(ir.VectorType(_DOUBLE, 4), [0.0] * 4)
+        for k, value in enumerate(args):
+            vector = builder.insert_element(vector, value, ir.IntType(32)(k))
+        return vector
 
-    return result(types.float64, width), build
+    return result(types.float64, types.float64, types.float64), build
+
+
+@intrinsic(prefer_literal=True)
+def lane(typing: Any, value: Any, index: Any) -> Any:
+    """Return the number in one lane."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.extract_element(args[0], ir.IntType(32)(index.literal_value))
+
+    return types.float64(value, index), build
+
+
+@intrinsic
+def total(typing: Any, value: Any) -> Any:
+    """Return the sum of all lanes, a power of two of them: the first half plus the second, and so on."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        (vector,), width = args, value.width
+        while width > 1:
+            width //= 2
+            halves = [
+                builder.shuffle_vector(vector, vector, ir.Constant(ir.VectorType(ir.IntType(32), width), part))
+                for part in (list(range(width)), list(range(width, 2 * width)))
+            ]
+            vector = builder.fadd(*halves)
+        return builder.extract_element(vector, ir.IntType(32)(0))
+
+    return types.float64(value), build
 
 
 @intrinsic

@@ -185,9 +185,11 @@ def simulate(
         )
     else:
         alone = every is not None or progress is not None or budget is not None or references is not None
+        left = count
         if leaping and not alone and watched_lanes.pays(scene, model, scheme, ensemble):
-            watched_lanes.march(scene, model, physics, ensemble, watched, steps)
-        _in_chunks(advance, steps, scheme, progress)
+            left = watched_lanes.march(scene, model, physics, ensemble, watched, steps)
+        if left > 0:
+            _in_chunks(advance, steps, scheme, progress)
 
     found = values(watched.memory)
     endings = {

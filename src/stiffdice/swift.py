@@ -2,10 +2,10 @@
 
 That kernel adds in the listings' order, node by node, and turns all eight. This one keeps three half edges a, b, c
 instead (the nodes are ±a ±b ±c) and the rotation of one step, which changes only where a torque does; asks first
-whether any node can feel the ground; and where one does treats all eight alike, so that they share a vector register.
-Until the first touch-down the two agree to round-off, and after it as long as anything does that differs in the last
-place: `docs/speed.md`. Nothing here is fused, nor summed in an order that the processor chooses, and nothing but the
-rotation by more than a quarter of a radian calls a library: the same numbers on every machine.
+whether any node can feel the ground; and where one does treats all eight alike, in the lanes of a vector register
+(`simd.py`), as it does the three half edges. Until the first touch-down the two agree to round-off, and after it as
+long as anything does that differs in the last place: `docs/speed.md`. Nothing but the rotation by more than a quarter
+of a radian in a step calls a library: the same numbers on every processor.
 """
 
 from __future__ import annotations
@@ -17,66 +17,65 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice import checks, compiled, models
-from stiffdice.contact import LAWS, acts, normal_force, swing_square
+from stiffdice.contact import LAWS, acts, swing_square
 from stiffdice.cube import SIGNS
+from stiffdice.lanes import push
 from stiffdice.models import MODELS
 from stiffdice.scene import Scene
+from stiffdice.simd import bits, lane, load, of_three, total
 from stiffdice.state import Physics, States, physics_of, start_of
 
-Vector = tuple[float, float, float]
+# Three numbers, each of one thing or of lanes of them.
+Vector = tuple[Any, Any, Any]
 Matrix = tuple[Vector, Vector, Vector]  # its rows
 
-# Of the nodes, in the order of the listings.
-_A, _B, _C = (np.ascontiguousarray(SIGNS[:, axis]) for axis in range(3))
+# The signs of a, b and c in each of the nodes, in the order of the listings.
+_SIGNS = np.ascontiguousarray(SIGNS.T)
 _NODES = len(SIGNS)
 
 # Steps in a row that nobody looks at: what might take many at once is asked in between.
 LONGEST = 64
-
-# What every node feels: force [N] and torque [N m]. In a record, because an array would cost a reference count.
-ROOM = np.dtype([("felt", np.float64, (6, _NODES))])
 
 # Up to the first of these angles, squared, three terms of a rotation's series are exact; up to the second, six are.
 _TINY, _SMALL = 1e-5, 0.0625
 
 
 def njit(function: Any) -> Any:
-    """Compile with sums reordered and fused with products; infinities and not-a-number are kept."""
+    """Compile a function into those that call it: a body is kept in registers, not handed over in memory."""
     return compiled.njit(function, forceinline=True)
-
-
-@compiled.njit(forceinline=True)
-def _moved(model: Any, p: Vector, q: Vector, factor: Any) -> Vector:
-    """Return p + factor·q, not fused: each step waits for the sum, which alone is done in half the time."""
-    if models.rises_only(model):
-        return p[0], p[1], p[2] + factor * q[2]
-    return p[0] + factor * q[0], p[1] + factor * q[1], p[2] + factor * q[2]
 
 
 class Body(NamedTuple):
     """A state as this kernel keeps it, in registers.
 
-    place [m], velocity [m/s], momentum: the angular one [kg m²/s]; spin [rad/s], as the nodes' velocities use it; half
-    edges a, b, c [m]; turned: the rotation of one step at the spin of the momentum.
+    place [m], velocity [m/s], momentum: the angular one [kg m²/s]; spin [rad/s], as the nodes' velocities use it, and
+    after the first step that of the momentum; edges [m]: along each axis lanes of the half edges a, b, c and a zero;
+    turned: the rotation of one step.
     """
 
     place: Vector
     velocity: Vector
     momentum: Vector
     spin: Vector
-    a: Vector
-    b: Vector
-    c: Vector
+    edges: Vector
     turned: Matrix
 
 
 @njit
-def _dot(p: Vector, q: Vector) -> float:
+def _moved(model: Any, p: Vector, q: Vector, factor: Any) -> Vector:
+    """Return p + factor·q."""
+    if models.rises_only(model):
+        return p[0], p[1], p[2] + factor * q[2]
+    return p[0] + factor * q[0], p[1] + factor * q[1], p[2] + factor * q[2]
+
+
+@njit
+def _dot(p: Vector, q: Vector) -> Any:
     return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 
 
 @njit
-def _up(model: Any, normal: Vector, p: Vector) -> float:
+def _up(model: Any, normal: Vector, p: Vector) -> Any:
     """Return the part of a vector along the ground's normal."""
     return p[2] if models.rises_only(model) else _dot(normal, p)
 
@@ -87,24 +86,14 @@ def _cross(p: Vector, q: Vector) -> Vector:
 
 
 @njit
-def _corner(a: Vector, b: Vector, c: Vector, i: Any, j: Any, k: Any) -> Vector:
-    """Return i·a + j·b + k·c, with signs i, j, k."""
-    return i * a[0] + j * b[0] + k * c[0], i * a[1] + j * b[1] + k * c[1], i * a[2] + j * b[2] + k * c[2]
-
-
-@njit
-def _sum(p: Vector, q: Vector) -> Vector:
-    return p[0] + q[0], p[1] + q[1], p[2] + q[2]
-
-
-@njit
 def _scaled(p: Vector, factor: Any) -> Vector:
     return p[0] * factor, p[1] * factor, p[2] * factor
 
 
 @njit
-def _times(rows: Matrix, p: Vector) -> Vector:
-    return _dot(rows[0], p), _dot(rows[1], p), _dot(rows[2], p)
+def _at_nodes(p: Any) -> Any:
+    """Return ±a ±b ±c of lanes a, b, c: a lane for each node."""
+    return load(_SIGNS, 0, 8) * lane(p, 0) + load(_SIGNS, 1, 8) * lane(p, 1) + load(_SIGNS, 2, 8) * lane(p, 2)
 
 
 @njit
@@ -131,7 +120,14 @@ def _rotation(v: Vector) -> Matrix:
 
 
 @njit
-def _taken(model: Any, physics: Physics, state: Any, h: float) -> Body:
+def _edges(nodes: Any, axis: int) -> Any:
+    """Return the half edges' part along an axis, from nodes that differ in one sign each."""
+    first = nodes[0, axis]
+    return of_three((first - nodes[3, axis]) / 2, (first - nodes[1, axis]) / 2, (first - nodes[4, axis]) / 2)
+
+
+@njit
+def _taken(physics: Physics, state: Any, h: float) -> Body:
     """Return the body of a state."""
     n, p, u, w = state.node_offset, state.position, state.velocity, state.angular_velocity
     momentum = (state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2])
@@ -140,108 +136,117 @@ def _taken(model: Any, physics: Physics, state: Any, h: float) -> Body:
         (u[0], u[1], u[2]),
         momentum,
         (w[0], w[1], w[2]),
-        ((n[0, 0] - n[3, 0]) / 2, (n[0, 1] - n[3, 1]) / 2, (n[0, 2] - n[3, 2]) / 2),
-        ((n[0, 0] - n[1, 0]) / 2, (n[0, 1] - n[1, 1]) / 2, (n[0, 2] - n[1, 2]) / 2),
-        ((n[0, 0] - n[4, 0]) / 2, (n[0, 1] - n[4, 1]) / 2, (n[0, 2] - n[4, 2]) / 2),
+        (_edges(n, 0), _edges(n, 1), _edges(n, 2)),
         _rotation(_scaled(momentum, h / physics.inertia)),
     )
 
 
 @njit
+def _rigid(physics: Physics, state: Any) -> bool:
+    """Return whether the nodes move with the spin of the momentum, as they do but for the first step of a throw."""
+    w, momentum = state.angular_velocity, state.angular_momentum
+    x, y, z = momentum[0] / physics.inertia, momentum[1] / physics.inertia, momentum[2] / physics.inertia
+    return w[0] == x and w[1] == y and w[2] == z
+
+
+@njit
 def _give(model: Any, physics: Physics, body: Body, state: Any) -> None:
-    """Write a body into a state."""
+    """Write a body into a state, after a step: its nodes move with the spin of its momentum then."""
     for axis in range(3):
         state.position[axis] = body.place[axis]
         state.velocity[axis] = body.velocity[axis]
     if models.turns(model):
         for axis in range(3):
             state.angular_momentum[axis] = body.momentum[axis]
-            state.angular_velocity[axis] = body.spin[axis]
-        for k in range(_NODES):
-            for axis in range(3):
-                state.node_offset[k, axis] = _A[k] * body.a[axis] + _B[k] * body.b[axis] + _C[k] * body.c[axis]
+            state.angular_velocity[axis] = body.momentum[axis] / physics.inertia
+            edges = body.edges[axis]
+            a, b, c = lane(edges, 0), lane(edges, 1), lane(edges, 2)
+            for k in range(_NODES):
+                state.node_offset[k, axis] = _SIGNS[0, k] * a + _SIGNS[1, k] * b + _SIGNS[2, k] * c
+
+
+@njit
+def _touching(model: Any, normal: Vector, body: Body) -> bool:
+    """Return whether a node is on the ground or below it: `_clearance`, with a sum less for a step to wait for."""
+    return bool(_up(model, normal, body.place) <= total(abs(_up(model, normal, body.edges))))
 
 
 @njit
 def _clearance(model: Any, normal: Vector, body: Body) -> float:
     """Return the height of the lowest node above the ground [m]."""
-    below = abs(_up(model, normal, body.a)) + abs(_up(model, normal, body.b)) + abs(_up(model, normal, body.c))
-    return _up(model, normal, body.place) - below
+    return _up(model, normal, body.place) - total(abs(_up(model, normal, body.edges)))
 
 
 @njit
 def _slowest(model: Any, normal: Vector, body: Body) -> float:
     """Return the speed away from the ground of the node where it is lowest [m/s]."""
-    if not models.turns(model):
-        return _up(model, normal, body.velocity)
-    rolling = _cross(normal, body.spin)
-    below = abs(_dot(rolling, body.a)) + abs(_dot(rolling, body.b)) + abs(_dot(rolling, body.c))
-    return _dot(normal, body.velocity) - below
+    speed = _up(model, normal, body.velocity)
+    return speed - total(abs(_dot(_cross(normal, body.spin), body.edges))) if models.turns(model) else speed
 
 
 @njit
-def _push(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, room: Any) -> tuple[Vector, Vector]:
+def _felt(model: Any, law: Any, physics: Physics, normal: Vector, body: Body) -> tuple[Vector, Vector]:
     """Return the ground's force [N] and torque [N m], normal forces and friction of all nodes as in `contact.py`."""
-    height, speed = _up(model, normal, body.place), _up(model, normal, body.velocity)
-    ha, hb, hc = _up(model, normal, body.a), _up(model, normal, body.b), _up(model, normal, body.c)
-    va, vb, vc = _cross(body.spin, body.a), _cross(body.spin, body.b), _cross(body.spin, body.c)
-    u = body.velocity
-    for node in range(_NODES):
-        i, j, k = _A[node], _B[node], _C[node]
-        depth = -(height + (i * ha + j * hb + k * hc))
-        if models.rises_only(model):
-            room.felt[2, node] = normal_force(law, depth, speed, physics.stiffness, physics.damping)
-            continue
-        if models.turns(model):
-            u = _sum(body.velocity, _corner(va, vb, vc, i, j, k))
-        up = _dot(normal, u)
-        fn = normal_force(law, depth, up, physics.stiffness, physics.damping)
-        along = _moved(model, u, normal, -up)
-        grip = physics.friction * fn / (math.sqrt(_dot(along, along)) + physics.cutoff)
-        force = _moved(model, _scaled(normal, fn), along, -grip)
-        room.felt[0, node], room.felt[1, node], room.felt[2, node] = force
-        if models.turns(model):
-            torque = _cross(_corner(body.a, body.b, body.c, i, j, k), force)
-            room.felt[3, node], room.felt[4, node], room.felt[5, node] = torque
+    depth = -(_up(model, normal, body.place) + _at_nodes(_up(model, normal, body.edges)))
     if models.rises_only(model):
-        return (0.0, 0.0, _total(room, 2)), (0.0, 0.0, 0.0)
-    force = _total(room, 0), _total(room, 1), _total(room, 2)
-    if not models.turns(model):
-        return force, (0.0, 0.0, 0.0)
-    return force, (_total(room, 3), _total(room, 4), _total(room, 5))
+        pressed = push(law, depth, physics.damping * body.velocity[2], physics.stiffness)
+        return (0.0, 0.0, total(pressed)), (0.0, 0.0, 0.0)
+    if models.turns(model):
+        r = _at_nodes(body.edges[0]), _at_nodes(body.edges[1]), _at_nodes(body.edges[2])
+        force = _on_nodes(model, law, physics, normal, depth, _sum(body.velocity, _cross(body.spin, r)))
+        torque = _cross(r, force)
+        return _totals(force), _totals(torque)
+    up = _up(model, normal, body.velocity)
+    pressed = total(push(law, depth, physics.damping * up, physics.stiffness))
+    return _rubbed(model, physics, normal, pressed, up, body.velocity), (0.0, 0.0, 0.0)
 
 
 @njit
-def _total(room: Any, part: int) -> float:
-    """Return the sum over all nodes."""
-    n = room.felt[part]
-    return ((n[0] + n[1]) + (n[2] + n[3])) + ((n[4] + n[5]) + (n[6] + n[7]))
+def _on_nodes(model: Any, law: Any, physics: Physics, normal: Vector, depth: Any, u: Vector) -> Vector:
+    """Return the force on nodes [N] that are so deep [m] and move at u [m/s]."""
+    up = _dot(normal, u)
+    return _rubbed(model, physics, normal, push(law, depth, physics.damping * up, physics.stiffness), up, u)
 
 
 @njit
-def _stepped(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, room: Any, h: float) -> Body:
+def _rubbed(model: Any, physics: Physics, normal: Vector, pressed: Any, up: Any, u: Vector) -> Vector:
+    """Return a normal force [N] and its friction at a velocity u [m/s], of which `up` is along the normal."""
+    along = _moved(model, u, normal, -up)
+    grip = physics.friction * pressed / (math.sqrt(_dot(along, along)) + physics.cutoff)
+    return (
+        pressed * normal[0] - grip * along[0],
+        pressed * normal[1] - grip * along[1],
+        pressed * normal[2] - grip * along[2],
+    )
+
+
+@njit
+def _sum(p: Vector, q: Vector) -> Vector:
+    return p[0] + q[0], p[1] + q[1], p[2] + q[2]
+
+
+@njit
+def _totals(p: Vector) -> Vector:
+    return total(p[0]), total(p[1]), total(p[2])
+
+
+@njit
+def _stepped(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, h: float) -> Body:
     """Return the body after a step of h [s] (equations 6 to 9)."""
-    velocity, momentum, turned = body.velocity, body.momentum, body.turned
-    if models.touches(model) and acts(law, _clearance(model, normal, body), _slowest(model, normal, body)):
-        force, torque = _push(model, law, physics, normal, body, room)
+    velocity, momentum, spin, turned = body.velocity, body.momentum, body.spin, body.turned
+    if models.touches(model) and acts(law, _touching(model, normal, body), _slowest(model, normal, body)):
+        force, torque = _felt(model, law, physics, normal, body)
         velocity = _moved(model, velocity, force, h / physics.mass)
         if models.turns(model):
             momentum = _moved(model, momentum, torque, h)
-            turned = _rotation(_scaled(momentum, h / physics.inertia))
+            spin = _scaled(momentum, 1 / physics.inertia)
+            turned = _rotation(_scaled(spin, h))
     velocity = (velocity[0], velocity[1], velocity[2] - h * physics.gravity)
     place = _moved(model, body.place, velocity, h)
     if not models.turns(model):
-        return Body(place, velocity, momentum, body.spin, body.a, body.b, body.c, turned)
-    return Body(
-        place,
-        velocity,
-        momentum,
-        _scaled(momentum, 1 / physics.inertia),
-        _times(turned, body.a),
-        _times(turned, body.b),
-        _times(turned, body.c),
-        turned,
-    )
+        return Body(place, velocity, momentum, spin, body.edges, turned)
+    edges = _dot(turned[0], body.edges), _dot(turned[1], body.edges), _dot(turned[2], body.edges)
+    return Body(place, velocity, momentum, spin, edges, turned)
 
 
 @njit
@@ -260,15 +265,19 @@ def _swing(model: Any, omega: Any, h: Any, above_rest: Any, speed: Any) -> float
 
 
 @njit
+def _unturned(body: Body, other: Body) -> bool:
+    edges, others = body.edges, other.edges
+    return bits((edges[0] != others[0]) | (edges[1] != others[1]) | (edges[2] != others[2])) == 0
+
+
+@njit
 def _same(body: Body, other: Body) -> bool:
     """Return whether two bodies are the same in every bit, and so will be all that come of them."""
     return (
         body.velocity == other.velocity
         and body.place == other.place
         and body.momentum == other.momentum
-        and body.spin == other.spin
-        and body.a == other.a
-        and body.b == other.b
+        and _unturned(body, other)
     )
 
 
@@ -290,17 +299,16 @@ def stretch(
     [J], and on the ground a swing below `low` [m²/s²] (`phases.rest_of`). The last step is left to be seen; `sight` has
     what it would have of those before. Where a step changes nothing at all, all that are left are the same.
     """
-    rooms = np.empty(1, ROOM)
-    room = rooms[0]
     normal = (physics.nx, physics.ny, physics.nz)
     h = sight.step_size
     behind = sight.lag * h * physics.gravity
     omega = math.sqrt(4 * physics.stiffness / physics.mass)
-    body = _taken(model, physics, state, h)
+    body = _taken(physics, state, h)
+    most = 1 if models.turns(model) and not _rigid(physics, state) else most
     flown, steps = sight.flight, 0
     while True:
         before = body
-        body = _stepped(model, law, physics, normal, before, room, h)
+        body = _stepped(model, law, physics, normal, before, h)
         clearance = _clearance(model, normal, body)
         steps += 1
         airborne = clearance > 0.0
@@ -326,14 +334,15 @@ def stretch(
 @compiled.njit(cache=True, nogil=True)
 def advance(model: Any, law: Any, physics: Physics, states: States, h: float, steps: int) -> None:
     """Take so many steps of h [s] with every state, one by one, nothing watched, nothing skipped."""
-    rooms = np.empty(1, ROOM)
-    room = rooms[0]
     normal = (physics.nx, physics.ny, physics.nz)
     for m in range(states.shape[0]):
-        body = _taken(model, physics, states[m], h)
-        for _ in range(steps):
-            body = _stepped(model, law, physics, normal, body, room, h)
-        _give(model, physics, body, states[m])
+        first = 0 if _rigid(physics, states[m]) else 1
+        for count in (first, steps - first):
+            body = _taken(physics, states[m], h)
+            for _ in range(count):
+                body = _stepped(model, law, physics, normal, body, h)
+            if count > 0:
+                _give(model, physics, body, states[m])
 
 
 def prepare(scene: Scene, model: str, steps: int) -> Callable[[], States]:

@@ -72,7 +72,7 @@ def _lowest_turning(body: Turning) -> Any:
 
 
 # (model, body) -> how far below the centre the lowest node is [m].
-_lowest = by_tag({Sliding: _lowest_moving, Tumbling: _lowest_turning})
+_lowest = by_tag({Sliding: _lowest_moving, Tumbling: _lowest_turning}, inlined=True)
 
 
 @inlined
@@ -87,7 +87,7 @@ def _motion_turning(e: Balance, body: Turning) -> Any:
 
 
 # (model, balance, body) -> the kinetic energy [J].
-_kinetic = by_tag({Sliding: _motion_moving, Tumbling: _motion_turning})
+_kinetic = by_tag({Sliding: _motion_moving, Tumbling: _motion_turning}, inlined=True)
 
 
 @inlined
@@ -106,7 +106,7 @@ def _size_turning(body: Turning) -> Any:
 
 
 # (model, body) -> what is no number below infinity if a part of the state is none.
-_size = by_tag({Sliding: _size_moving, Tumbling: _size_turning})
+_size = by_tag({Sliding: _size_moving, Tumbling: _size_turning}, inlined=True)
 
 
 @inlined
@@ -122,7 +122,7 @@ def _settles_turning(e: Balance, h: float, body: Turning, clearance: Any, rest: 
 
 
 # (model, balance, h, body, clearance, rest) -> who is to be shown because it may rest, or no longer slides.
-_settles = by_tag({Sliding: _settles_moving, Tumbling: _settles_turning})
+_settles = by_tag({Sliding: _settles_moving, Tumbling: _settles_turning}, inlined=True)
 
 
 @njit
@@ -137,7 +137,7 @@ def _turning_in_steps(state: Any) -> bool:
 
 
 # (model, state) -> whether `phases.py` knows nothing of the motion, so that every step is taken.
-_in_steps = by_tag({Sliding: _moving_in_steps, Tumbling: _turning_in_steps})
+_in_steps = by_tag({Sliding: _moving_in_steps, Tumbling: _turning_in_steps}, inlined=True)
 
 
 @inlined
@@ -257,8 +257,8 @@ def _march(
     references: npt.NDArray[np.void],
     steps: int,
     block: Array,
-) -> None:
-    """Advance members in lanes, as long as they have to take steps."""
+) -> int:
+    """Advance members in lanes, as long as they have to take steps; return how many are not at their end then."""
     inside = np.full(block.shape[1], -1)  # the member in each lane
     waiting, happening = 0, -1
     while True:
@@ -294,6 +294,11 @@ def _march(
         if inside.max() < 0:
             break
         happening = _run_on(model, posture, law, k, e, block)
+    left = 0
+    for m in range(ensemble.shape[0]):
+        if steps_done[m] < steps and open_of(memory[m]) > 0 and memory[m].finite[0] == 0.0:
+            left += 1
+    return left
 
 
 @njit
@@ -321,17 +326,17 @@ def _flies_on(
     return False
 
 
-def march(scene: Scene, model: str, physics: Physics, ensemble: States, watched: Any, steps: int) -> None:
-    """Advance all members of a model in `MODELS` as far as they have to be stepped; `simulate` goes on from there.
+def march(scene: Scene, model: str, physics: Physics, ensemble: States, watched: Any, steps: int) -> int:
+    """Advance all members of a model in `MODELS` as far as they have to be stepped; return how many are to go on.
 
-    watched: what `simulate` keeps of them, begun.
+    watched: what `simulate` keeps of them, begun. `simulate` goes on with those that are left.
     """
     h = scene.duration / steps
     axes = lanes.axes_of(scene)
     k, e = lanes.numbers_of(scene, h), _balance(physics, axes, h, watched.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
-        return
-    _march(
+        return len(ensemble)
+    left: int = _march(
         schemes.SCHEMES[SCHEME],
         MODELS[model],
         lanes.posture_of(scene, model, ensemble),
@@ -346,6 +351,7 @@ def march(scene: Scene, model: str, physics: Physics, ensemble: States, watched:
         steps,
         np.zeros((ROWS, lanes.WIDTHS[model])),
     )
+    return left
 
 
 def pays(scene: Scene, model: str, scheme: str, launches: States) -> bool:

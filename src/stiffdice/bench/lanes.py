@@ -18,7 +18,7 @@ MEMBERS = {
 
 def cases(effort: Effort) -> Iterator[Case]:
     """Yield the throw and its vertical part under both laws, on one thread and on two."""
-    steps = max(1, effort.steps // 50)
+    steps = max(1, effort.steps // 5)
     for (model, law), flops in lanes.FLOPS.items():
         if model not in MEMBERS:
             continue
