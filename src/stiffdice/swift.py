@@ -77,7 +77,9 @@ def _dot(p: Vector, q: Vector) -> Any:
 @njit
 def _up(model: Any, normal: Vector, p: Vector) -> Any:
     """Return the part of a vector along the ground's normal."""
-    return p[2] if models.rises_only(model) else _dot(normal, p)
+    if models.rises_only(model) or normal[2] == 1.0:
+        return p[2]
+    return _dot(normal, p)
 
 
 @njit
@@ -231,22 +233,43 @@ def _totals(p: Vector) -> Vector:
 
 
 @njit
-def _stepped(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, h: float) -> Body:
-    """Return the body after a step of h [s] (equations 6 to 9)."""
-    velocity, momentum, spin, turned = body.velocity, body.momentum, body.spin, body.turned
-    if models.touches(model) and acts(law, _touching(model, normal, body), _slowest(model, normal, body)):
-        force, torque = _felt(model, law, physics, normal, body)
-        velocity = _moved(model, velocity, force, h / physics.mass)
-        if models.turns(model):
-            momentum = _moved(model, momentum, torque, h)
-            spin = _scaled(momentum, 1 / physics.inertia)
-            turned = _rotation(_scaled(spin, h))
-    velocity = (velocity[0], velocity[1], velocity[2] - h * physics.gravity)
-    place = _moved(model, body.place, velocity, h)
+def _acts(model: Any, law: Any, normal: Vector, body: Body) -> bool:
+    """Return whether the ground can act on the body."""
+    if not models.touches(model):
+        return False
+    return bool(acts(law, _touching(model, normal, body), _slowest(model, normal, body)))
+
+
+@njit
+def _kicked(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, h: float) -> Body:
+    """Return the body with what the ground does to its momenta in a step of h [s] (equations 6 and 8)."""
+    force, torque = _felt(model, law, physics, normal, body)
+    velocity = _moved(model, body.velocity, force, h / physics.mass)
     if not models.turns(model):
-        return Body(place, velocity, momentum, spin, body.edges, turned)
+        return Body(body.place, velocity, body.momentum, body.spin, body.edges, body.turned)
+    momentum = _moved(model, body.momentum, torque, h)
+    spin = _scaled(momentum, 1 / physics.inertia)
+    return Body(body.place, velocity, momentum, spin, body.edges, _rotation(_scaled(spin, h)))
+
+
+@njit
+def _flown(model: Any, physics: Physics, body: Body, h: float) -> Body:
+    """Return the body after a step of h [s] with its weight alone (equations 6, 7 and 9)."""
+    u = body.velocity
+    velocity = (u[0], u[1], u[2] - h * physics.gravity)
+    place, turned = _moved(model, body.place, velocity, h), body.turned
+    if not models.turns(model):
+        return Body(place, velocity, body.momentum, body.spin, body.edges, turned)
     edges = _dot(turned[0], body.edges), _dot(turned[1], body.edges), _dot(turned[2], body.edges)
-    return Body(place, velocity, momentum, spin, edges, turned)
+    return Body(place, velocity, body.momentum, body.spin, edges, turned)
+
+
+@njit
+def _stepped(model: Any, law: Any, physics: Physics, normal: Vector, body: Body, h: float) -> Body:
+    """Return the body after a step of h [s]."""
+    if _acts(model, law, normal, body):
+        body = _kicked(model, law, physics, normal, body, h)
+    return _flown(model, physics, body, h)
 
 
 @njit
@@ -338,9 +361,15 @@ def advance(model: Any, law: Any, physics: Physics, states: States, h: float, st
     for m in range(states.shape[0]):
         first = 0 if _rigid(physics, states[m]) else 1
         for count in (first, steps - first):
-            body = _taken(physics, states[m], h)
-            for _ in range(count):
-                body = _stepped(model, law, physics, normal, body, h)
+            body, left = _taken(physics, states[m], h), count
+            while left > 0:
+                # The loop in the air by itself has registers for all it needs.
+                while left > 0 and not _acts(model, law, normal, body):
+                    body = _flown(model, physics, body, h)
+                    left -= 1
+                if left > 0:
+                    body = _flown(model, physics, _kicked(model, law, physics, normal, body, h), h)
+                    left -= 1
             if count > 0:
                 _give(model, physics, body, states[m])
 
