@@ -334,6 +334,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
 """
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_members(tmp_path):
     """Fifty times as many runs; kept in memory, their measures alone would be 50 MB."""
 

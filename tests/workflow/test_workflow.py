@@ -202,6 +202,7 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
     assert before == {path: path.stat().st_mtime_ns for path in (finished.folder / "results").rglob("*")}
 
 
+@pytest.mark.long
 def test_a_changed_style_redraws_only(finished, edited):
     edited("src/stiffdice/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
     assert finished.jobs_due() == {"figure": 4}
@@ -214,6 +215,7 @@ def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     assert finished.jobs_due() == everything
 
 
+@pytest.mark.long
 def test_a_changed_analysis_computes_no_run_again(finished, edited):
     edited("src/stiffdice/frontier.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"frontier": 1, "figure": 1, "table": 1}
@@ -224,11 +226,13 @@ def test_a_changed_scene_is_run_again(finished, edited):
     assert finished.jobs_due() == {"trajectory": 2, "experiment": 1, "figure": 2}
 
 
+@pytest.mark.long
 def test_a_changed_scene_of_the_sweep_is_swept_again(finished, edited):
     edited("config/scenes/figure-13.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
     assert finished.jobs_due() == AGAIN
 
 
+@pytest.mark.long
 def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
     edited("src/stiffdice/ensemble.py", lambda text: text + "\n")
     assert finished.jobs_due() == AGAIN
@@ -244,6 +248,7 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
         ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
+@pytest.mark.long
 def test_a_changed_script_does_its_part_again(finished, edited, script, due):
     edited(f"workflow/scripts/{script}.py", lambda text: text + "\n")
     assert finished.jobs_due() == due
@@ -255,6 +260,7 @@ def test_a_touched_file_is_no_change(finished):
     assert finished.jobs_due() == {}
 
 
+@pytest.mark.long
 def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
     """Unless runs were stopped by the old one."""
     edited("config/tiny.yaml", lambda text: text + "criteria: {apex: 0.5}\n")
@@ -263,6 +269,7 @@ def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
     assert finished.jobs_due() == AGAIN
 
 
+@pytest.mark.long
 def test_a_changed_drawing_draws_its_figure_only(finished, edited):
     edited("src/stiffdice/figures/ledger.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"figure": 1}
@@ -274,16 +281,19 @@ def test_a_timing_keeps_its_times_where_benchmarks_are(finished):
     assert found.attrs["machine_cores"] >= 1
 
 
+@pytest.mark.long
 def test_changed_options_make_an_experiment_again(finished, edited):
     edited("config/tiny.yaml", lambda text: text.replace("- 20000", "- 30000"))
     assert finished.jobs_due() == {"experiment": 1, "figure": 1}
 
 
+@pytest.mark.long
 def test_a_changed_title_redraws_its_figure(finished, edited):
     edited("config/tiny.yaml", lambda text: text.replace("title: Position", "title: Place"))
     assert finished.jobs_due() == {"figure": 1}
 
 
+@pytest.mark.long
 def test_another_grid_is_computed(finished, edited):
     edited("config/tiny.yaml", lambda text: text.replace("members: 4", "members: 5"))
     assert finished.jobs_due() == AGAIN
@@ -300,6 +310,7 @@ def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
 
 
 @pytest.mark.parametrize("name", ["../x", "a b", "v1.5", "nowhere", ""])
+@pytest.mark.long
 def test_a_study_that_is_not_there_is_one_line(finished, name):
     command = [sys.executable, "-m", "snakemake", "-n", "study", "--config", f"study={name}"]
     done = subprocess.run(command, cwd=finished.folder, capture_output=True, text=True, check=False)
@@ -309,6 +320,7 @@ def test_a_study_that_is_not_there_is_one_line(finished, name):
     assert re.match(r"stiffdice: config/.*(letters, digits, hyphens and underscores|No such file)", lines[0])
 
 
+@pytest.mark.long
 def test_another_study_does_not_mind_a_broken_paper(finished, edited):
     edited("config/paper.yaml", lambda text: "question: [")
     assert finished.jobs_due() == {}
@@ -333,6 +345,7 @@ def test_a_damaged_shard_is_named_with_its_remedy(finished, tmp_path):
         finished.snakemake("--touch")
 
 
+@pytest.mark.long
 def test_the_report_works_without_a_network(finished):
     done = finished.snakemake("--report", "report.html")
     assert done.returncode == 0, done.stderr
@@ -348,6 +361,7 @@ def test_lint_finds_nothing(finished):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     """In the same study; what needs one that is not installed is left out with a line."""
     project, steps = Project(tmp_path), TINY["sweeps"]["steps"]
@@ -371,6 +385,7 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     assert project.jobs_due() == {}
 
 
+@pytest.mark.long
 @pytest.mark.long
 def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other = Project(tmp_path)
