@@ -8,6 +8,8 @@ from stiffdice.figures import pieces as drawing
 from stiffdice.figures import style
 from stiffdice.scene import Scene
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def dataset():

@@ -17,6 +17,8 @@ pytest.importorskip("pydrake")
 
 from stiffdice.peers import drake
 
+pytestmark = pytest.mark.long
+
 HALF = 1 / math.sqrt(3)  # of the true cube's side
 THROW = {
     "ground": {"stiffness": 100, "damping": 0.5, "friction": 0.1},

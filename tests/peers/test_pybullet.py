@@ -17,6 +17,8 @@ from stiffdice.theory import sag
 pytest.importorskip("stiffdice.peers.pybullet")
 from stiffdice.peers import pybullet
 
+pytestmark = pytest.mark.long
+
 TUMBLE = {"angular_momentum": [0.3, 0.5, 0.2], "orientation": [0.1, 0.2, 0.3], "node_velocity": "rigid"}
 
 # Rotation vectors that bring a face, an edge or a corner of the cube down.
