@@ -328,7 +328,7 @@ def stretch(
     omega = math.sqrt(4 * physics.stiffness / physics.mass)
     body = _taken(physics, state, h)
     most = 1 if models.turns(model) and not _rigid(physics, state) else most
-    flown, steps = sight.flight, 0
+    flown, steps, taken = sight.flight, 0, 0
     while True:
         before = body
         body = _stepped(model, law, physics, normal, before, h)
@@ -342,7 +342,8 @@ def stretch(
                 break
             flown += 1.0
         elif _same(body, before):
-            return most, steps, steps
+            taken = most
+            break
         elif _swing(model, omega, h, clearance + sight.sag, _up(model, normal, body.velocity)) < low:
             break
         sight.speed_before = sight.speed
@@ -351,7 +352,7 @@ def stretch(
         sight.clearance = clearance
     sight.flight = flown
     _give(model, physics, body, state)
-    return steps, steps, steps
+    return max(taken, steps), steps, steps
 
 
 @compiled.njit(cache=True, nogil=True)
