@@ -69,8 +69,9 @@ def free_steps(model: Any, law: Any, physics: Physics, state: Any, sight: Any, m
     margin = 4 * h * (abs(sight.speed) + h * abs(sight.pull))
     room = sight.height - models.extent(model, physics, state) - margin
     steps = _until(room, sight.speed - h * sight.pull, sight.pull, h) if room > 0.0 else 0.0
-    steps = min(steps, _undisturbed(law, model, sight.speed, sight))
-    if models.turns(model) and steps < most and _undisturbed(law, model, sight.speed, sight) > steps:
+    undisturbed = _undisturbed(law, model, sight.speed, sight)
+    steps = min(steps, undisturbed)
+    if models.turns(model) and steps < most and undisturbed > steps:
         steps = max(steps, _turning(physics, state, sight, margin))
     return 0 if steps < WORTHWHILE else int(min(steps, float(most)))
 

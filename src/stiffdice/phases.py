@@ -141,11 +141,16 @@ def rest_of(model: Any, law: Any, physics: Physics, sight: Any) -> float:
 
 
 @njit
+def _rubs(physics: Physics, state: Any) -> bool:
+    """Return whether friction acts on a cube that touches the ground."""
+    return physics.friction > 0.0 and (state.velocity[0] != 0.0 or state.velocity[1] != 0.0)
+
+
+@njit
 def follows(scheme: Any, model: Any, physics: Physics, state: Any, sight: Any) -> bool:
     """Return whether this is a motion of which `skip` knows the phases, and takes one as soon as it may."""
-    rubs = physics.friction > 0.0 and (state.velocity[0] != 0.0 or state.velocity[1] != 0.0)
     flat = not models.turns(model) and sight.room > 0.0 and physics.nz == 1.0
-    return flat and not rubs and schemes.proven(scheme)
+    return flat and not _rubs(physics, state) and schemes.proven(scheme)
 
 
 @njit
@@ -156,15 +161,15 @@ def skip(scheme: Any, model: Any, law: Any, physics: Physics, state: Any, sight:
     """
     if models.turns(model) or not sight.room > 0.0:
         return 0
-    proven = schemes.proven(scheme)
-    rubs = physics.friction > 0.0 and (state.velocity[0] != 0.0 or state.velocity[1] != 0.0)
+    rubs = _rubs(physics, state)
     stays = not rubs and sight.still > 0.0
-    if proven and not stays:
+    if schemes.proven(scheme) and not stays:
         stays = _rests(law, physics, sight) or (not rubs and _hangs(law, physics, sight))
     if stays and sight.held == 0.0:
         sight.held = 1.0
         return 0
-    if not proven or physics.nz != 1.0 or rubs or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
+    followed = follows(scheme, model, physics, state, sight)
+    if not followed or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
         return 0
     h = sight.step_size
     sight.clearance = sight.height - lowest_of(physics, state)  # far from the ground it was a lower bound
