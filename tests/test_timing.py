@@ -8,33 +8,45 @@ import pytest
 from stiffdice.timing import SHORTEST, Launched, interleaved, machine, seconds_of
 
 
-def test_runs_take_turns_and_a_long_one_is_called_once():
-    calls = []
+class Clock:
+    """A clock that goes as far as runs say, whatever else this machine does meanwhile."""
 
-    def run(name, seconds):
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def run(self, seconds, then=lambda: None):
         def call():
-            calls.append(name)
-            time.sleep(seconds)
+            self.now += seconds
+            then()
 
         return call
 
-    times = interleaved([run("a", 2 * SHORTEST), run("long", 0.03), run("b", 4 * SHORTEST)], 3, 0.02)
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(time, "perf_counter", clock)
+    return clock
+
+
+def test_runs_take_turns_and_a_long_one_is_called_once(clock):
+    calls = []
+    seconds = {"a": 2 * SHORTEST, "long": 0.03, "b": 4 * SHORTEST}
+    runs = [clock.run(cost, lambda name=name: calls.append(name)) for name, cost in seconds.items()]
+    times = interleaved(runs, 3, 0.02)
     assert calls == ["a", "long", "b"] + ["a", "b"] * 3
-    assert (times.median >= [2 * SHORTEST, 0.03, 4 * SHORTEST]).all()
-    assert (times.spread >= 0).all()
-    assert times.spread[1] == 0
+    assert times.median == pytest.approx(list(seconds.values()))
+    assert times.spread == pytest.approx(0, abs=1e-12)
 
 
-def test_a_short_run_is_repeated_until_the_clock_can_tell():
-    count = 0
-
-    def run():
-        nonlocal count
-        count += 1
-
-    median = interleaved([run], 5, 1.0).median[0]
-    assert median < 1e-4
-    assert count > 100
+def test_a_short_run_is_repeated_until_the_clock_can_tell(clock):
+    calls = []
+    median = interleaved([clock.run(SHORTEST / 100, lambda: calls.append(1))], 5, 1.0).median[0]
+    assert median == pytest.approx(SHORTEST / 100)
+    assert len(calls) == pytest.approx(1 + 5 * 100, abs=5)
 
 
 def test_the_machine_is_named():
@@ -51,16 +63,16 @@ def test_what_is_told_of_it_is_text(key):
     assert isinstance(machine()[key], str)
 
 
-def test_what_makes_a_run_ready_is_not_timed():
+def test_what_makes_a_run_ready_is_not_timed(clock):
     order = []
 
     def ready():
-        time.sleep(0.02)
+        clock.now += 1.0
         order.append("ready")
-        return lambda: order.append("made")
+        return clock.run(0.25, lambda: order.append("made"))
 
     run = Launched(ready)
-    assert seconds_of(run, 3) < 0.005
+    assert seconds_of(run, 3) == pytest.approx(0.25)
     assert order == ["ready", "made"] * 3
     run()
     assert order == ["ready", "made"] * 4

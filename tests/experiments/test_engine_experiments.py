@@ -117,7 +117,6 @@ def test_a_throw_comes_closer_with_the_step_and_numpy_is_as_far_as_we_are(throw)
 def test_steps_and_evaluations_are_counted(speed):
     assert of(speed, "numpy").taken.values.tolist() == [600, 600]
     assert (of(speed, "scipy").taken != 600).all()
-    assert (of(speed, "numpy").seconds > 20 * of(speed, "symplectic_euler").seconds).all()
 
 
 def test_files_say_of_which_versions_engines_were(limits, contact, speed, tmp_path):

@@ -136,11 +136,10 @@ def test_times_are_taken_of_the_same_rungs(flat, timed):
     assert {"machine_processor", "versions", "measured_at"} <= set(timed.attrs)
 
 
-def test_a_step_takes_nanoseconds_and_a_run_of_a_peer_less_than_a_blink(timed):
+def test_no_step_and_no_run_of_a_peer_is_faster_than_any_processor(timed):
     names = meanings_of(timed.method)
-    assert 1e-10 < float(timed.seconds_per_step[0, names.index("symplectic_euler")]) < 1e-6
-    lsoda = timed.seconds[0, names.index("scipy_lsoda")]
-    assert 1e-5 < float(lsoda[0]) < 0.05
+    assert float(timed.seconds_per_step[0, names.index("symplectic_euler")]) > 1e-10
+    assert float(timed.seconds[0, names.index("scipy_lsoda")][0]) > 1e-5
 
 
 def test_the_tables_tell_who_is_cheapest(flat, timed):
