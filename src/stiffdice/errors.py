@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class StiffdiceError(Exception):
     """An error whose message is written for the person who ran the command: one line, exit status 2."""
@@ -10,17 +12,17 @@ class StiffdiceError(Exception):
 class InputError(StiffdiceError):
     """A scene, study, option or file that cannot be used; names the key, the value and what is allowed."""
 
-    def within(self, source: str) -> InputError:
-        """Return the same error, told with the file it was found in."""
-        return InputError(f"{source}: {self}")
+    def within(self, source: str) -> Self:
+        """Return the same error, told with where it was found."""
+        return type(self)(f"{source}: {self}")
 
 
 class NotInstalledError(InputError):
     """An engine that is asked for and is not there; a study leaves out what needs it."""
 
-    def within(self, source: str) -> NotInstalledError:
-        """Return the same error, told with where it was found."""
-        return NotInstalledError(f"{source}: {self}")
+
+class RefusedError(InputError):
+    """A file that is there and cannot be trusted: damaged, of another program, or made to mislead."""
 
 
 class OutputError(StiffdiceError):

@@ -15,8 +15,9 @@ import pytest
 import xarray as xr
 
 from stiffdice import __version__
-from stiffdice.errors import InputError, OutputError
+from stiffdice.errors import InputError, RefusedError, OutputError
 from stiffdice.io.layout import run_dataset
+from stiffdice.io import seal
 from stiffdice.io.read import open_file
 from stiffdice.io.write import check_target, write_bytes, write_dataset
 from stiffdice.scene import from_mapping
@@ -124,7 +125,11 @@ def test_a_damaged_file_is_noticed(stored):
         chunk = file["position"].id.get_chunk_info(0)
     image[chunk.byte_offset + chunk.size // 2] ^= 0xFF
     stored.write_bytes(image)
-    with pytest.raises(InputError, match=rf"{stored}: not a readable HDF5 file"):
+    with pytest.raises(RefusedError, match=rf"{stored}: damaged: its content is not what was sealed"):
+        open_file(stored)
+    stored.write_bytes(image[: -seal.LENGTH])
+    seal.seal(stored)
+    with pytest.raises(RefusedError, match=rf"{stored}: not a readable HDF5 file"):
         open_file(stored)
 
 
@@ -156,6 +161,7 @@ def group(file, tmp_path):
 def test_a_file_that_points_elsewhere_is_refused(stored, tmp_path, trick):
     with h5py.File(stored, "a") as file:
         trick(file, tmp_path)
+    seal.seal(stored)
     with pytest.raises(InputError, match=rf"{stored}: elsewhere: "):
         open_file(stored)
 

@@ -5,7 +5,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
-from stiffdice import runners, simulators
+from stiffdice import results, runners, simulators
 from stiffdice import study as studies
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.errors import InputError
@@ -90,12 +90,6 @@ def shards_of(name, sweep):
     return study(name).sweeps[sweep].shards()
 
 
-def figure_files(name, figure):
-    """Return the files of one figure: an animation is a GIF, the others are SVG and PNG."""
-    kinds = ["gif"] if study(name).figures[figure].draw == "animation" else ["svg", "png"]
-    return [f"results/{name}/figures/{figure}.{kind}" for kind in kinds]
-
-
 # Where the files of each kind are. Times are apart, with the other files that no two rebuilds share.
 PLACES = {
     "sweeps": "sweeps/{}/frontier.h5",
@@ -143,16 +137,8 @@ def tell_left_out(name):
 
 def everything_of(name):
     """Return all results of a study; what needs an engine that is not installed is left out, with a line."""
-    planned = study(name)
     tell_left_out(name)
-    files = [file for figure in planned.figures for file in figure_files(name, figure)]
-    files += [f"results/{name}/runs/{run}.{preset}.h5" for run in planned.runs for preset in planned.runs[run].presets]
-    for sweep in planned.sweeps:
-        files += [f"results/{name}/sweeps/{sweep}/{file}" for file in ("sweep.h5", "frontier.h5", "frontier.csv")]
-    files += [f"results/{name}/experiments/{experiment}.h5" for experiment in planned.experiments]
-    files += [f"results/{name}/benchmarks/timings/{timing}.h5" for timing in planned.timings]
-    files += [f"results/{name}/tables/{table}.{kind}" for table in planned.tables for kind in ("md", "csv")]
-    return files
+    return [f"results/{name}/{file}" for result in results.of(study(name)) for file in result.files]
 
 
 # A mistake in the study asked for is told before anything else is said.

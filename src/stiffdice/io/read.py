@@ -9,8 +9,8 @@ from pathlib import Path
 import h5py
 import xarray as xr
 
-from stiffdice.errors import InputError
-from stiffdice.io import FORMAT_VERSION
+from stiffdice.errors import InputError, RefusedError
+from stiffdice.io import FORMAT_VERSION, seal
 
 
 def open_file(path: str | Path) -> xr.Dataset:
@@ -47,27 +47,34 @@ def _told(path: str | Path) -> Iterator[None]:
         if isinstance(error, OSError) and error.strerror:
             raise InputError(f"{path}: {error.strerror}") from None
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: not a readable HDF5 file ({reason})") from None
+        raise RefusedError(f"{path}: not a readable HDF5 file ({reason})") from None
+
+
+# Versions of the format whose files had no seal.
+_UNSEALED = ("1.0", "1.1")
 
 
 def _inspect(path: Path) -> None:
-    with path.open("rb"):  # a missing file should say so in the system's words
-        pass
+    sealed = seal.is_sealed(path)
+    if sealed:
+        seal.check(path)
     with h5py.File(path, "r") as file:
         version = file.attrs.get("format_version")
         if not isinstance(version, str):
-            raise InputError("has no format_version; not a file of stiffdice")
+            raise RefusedError("has no format_version; not a file of stiffdice")
         if version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-            raise InputError(f"format_version = {version}: allowed is {FORMAT_VERSION.split('.')[0]}.x")
+            raise RefusedError(f"format_version = {version}: allowed is {FORMAT_VERSION.split('.')[0]}.x")
+        if not sealed and version not in _UNSEALED:
+            raise RefusedError("damaged: has no seal at its end; it is cut short, or was changed by another program")
         for name, item in _members(file):
             if not isinstance(item, h5py.Dataset):
-                raise InputError(f"{name}: a group; our files have none")
+                raise RefusedError(f"{name}: a group; our files have none")
             if item.is_virtual or item.external:
-                raise InputError(f"{name}: keeps its data outside of this file")
+                raise RefusedError(f"{name}: keeps its data outside of this file")
 
 
 def _members(file: h5py.File) -> Iterator[tuple[str, object]]:
     for name in file:
         if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise InputError(f"{name}: a link that points elsewhere")
+            raise RefusedError(f"{name}: a link that points elsewhere")
         yield name, file[name]

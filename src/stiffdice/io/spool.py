@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.errors import OutputError
+from stiffdice.io import seal
 from stiffdice.io.write import check_target, store
 
 # Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress.
@@ -89,6 +90,7 @@ class Spool:
         try:
             self._file.close()
             if kind is None:
+                seal.seal(self._temporary)
                 store(self._temporary, self._target)
         except (OSError, RuntimeError) as failure:
             if kind is None:  # otherwise what ended the block is told

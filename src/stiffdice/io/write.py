@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.errors import OutputError
+from stiffdice.io import seal
 
 
 def check_target(path: str | Path) -> Path:
@@ -24,12 +25,14 @@ def check_target(path: str | Path) -> Path:
     return target
 
 
-def write_bytes(data: bytes | memoryview, path: str | Path) -> None:
-    """Store `data` under `path`; raises OutputError, and leaves what was there before, if it cannot."""
+def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:
+    """Store `data`, and `end` after it, under `path`; raises OutputError, and leaves what was there, if it cannot."""
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        temporary.write_bytes(data)
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.write(end)
         store(temporary, target)
     except OSError as error:
         raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
@@ -62,10 +65,10 @@ def _sync_folder(folder: Path) -> None:
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
     """Store a dataset as netCDF-4 on HDF5; raises OutputError if it cannot.
 
-    Compressed (gzip, shuffle) with a checksum on every chunk (fletcher32). Equal datasets give equal bytes.
+    Compressed (gzip, shuffle) with a checksum on every chunk (fletcher32), and sealed. Equal datasets give equal bytes.
     """
-    image = dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset))
-    write_bytes(memoryview(image), path)
+    image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset)))
+    write_bytes(image, path, seal.line_of(image))
 
 
 def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, object]]:

@@ -1,0 +1,72 @@
+"""A line at the end of a file that says what is before it: damage is seen before anything else is read.
+
+HDF5 itself keeps checksums of compressed values only; a flipped bit in an attribute would be another number. Its
+readers pay no attention to what follows the end that the file's own head names, so a sealed file opens everywhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from pathlib import Path
+from typing import BinaryIO
+
+from stiffdice.errors import RefusedError
+
+_LINE = "\nstiffdice seal: sha256 {} of {:020d} bytes\n"
+_PATTERN = re.compile(rb"\nstiffdice seal: sha256 ([0-9a-f]{64}) of ([0-9]{20}) bytes\n")
+LENGTH = len(_LINE.format("0" * 64, 0))  # bytes
+
+_AT_ONCE = 1 << 20  # bytes read at a time
+
+
+def line_of(data: bytes | memoryview) -> bytes:
+    """Return the line that seals so much data."""
+    return _line(hashlib.sha256(data).hexdigest(), len(data))
+
+
+def seal(path: Path) -> None:
+    """Add the line to a finished file; raises OSError if it cannot be written."""
+    with path.open("r+b") as file:
+        length = os.fstat(file.fileno()).st_size
+        line = _line(_digest(file, length), length)
+        file.seek(length)
+        file.write(line)
+
+
+def is_sealed(path: Path) -> bool:
+    """Return whether a file ends with such a line; raises OSError if it cannot be read."""
+    with path.open("rb") as file:
+        file.seek(max(os.fstat(file.fileno()).st_size - LENGTH, 0))
+        return _PATTERN.fullmatch(file.read(LENGTH)) is not None
+
+
+def check(path: Path) -> None:
+    """Raise RefusedError unless a sealed file is as it was sealed, OSError if it cannot be read."""
+    with path.open("rb") as file:
+        length = os.fstat(file.fileno()).st_size - LENGTH
+        file.seek(length)
+        told = _PATTERN.fullmatch(file.read())
+        assert told is not None, "asked of a sealed file"
+        if int(told[2]) != length:
+            raise RefusedError(f"damaged: {length} bytes long, its seal is for {int(told[2])}")
+        file.seek(0)
+        if _digest(file, length).encode("ascii") != told[1]:
+            raise RefusedError("damaged: its content is not what was sealed")
+
+
+def _line(digest: str, length: int) -> bytes:
+    return _LINE.format(digest, length).encode("ascii")
+
+
+def _digest(file: BinaryIO, length: int) -> str:
+    """Return the SHA-256 of the next so many bytes."""
+    digest = hashlib.sha256()
+    while length > 0:
+        part = file.read(min(_AT_ONCE, length))
+        if not part:
+            break
+        digest.update(part)
+        length -= len(part)
+    return digest.hexdigest()
