@@ -1,0 +1,33 @@
+"""What is in an archive, byte for byte: a digest of every file, as `sha256sum --check` reads it, too."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from stiffdice.errors import RefusedError
+
+# At the top of every archive; the only file that it does not list.
+NAME = "manifest-sha256.txt"
+
+_LINE = re.compile(r"([0-9a-f]{64})  ([^\n\r]+)")
+
+
+def text_of(digests: Mapping[str, str]) -> str:
+    """Return the manifest of files: path (relative, with /) → SHA-256 in hexadecimal digits."""
+    return "".join(f"{digests[path]}  {path}\n" for path in sorted(digests))
+
+
+def parse(text: str) -> dict[str, str]:
+    """Return the digest of every file, by path; raises RefusedError naming the line that is none."""
+    digests: dict[str, str] = {}
+    for number, line in enumerate(text.split("\n")[:-1], 1):
+        found = _LINE.fullmatch(line)
+        if found is None:
+            raise RefusedError(f"{NAME}: line {number}: allowed are a SHA-256, two spaces and a path")
+        if found[2] in digests:
+            raise RefusedError(f"{NAME}: line {number}: {found[2]} is listed twice")
+        digests[found[2]] = found[1]
+    if not text.endswith("\n"):
+        raise RefusedError(f"{NAME}: does not end with a whole line; it is cut short")
+    return digests

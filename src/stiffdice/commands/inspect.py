@@ -1,0 +1,34 @@
+"""`stiffdice inspect`: what a file holds."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLES = """\
+examples:
+  stiffdice inspect throw.h5
+  stiffdice inspect results/paper/sweep/sweep.h5
+  stiffdice inspect throw.h5 --json
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a file holds: its verdict, its scene, its variables",
+        description="Say what a file of stiffdice holds: its verdict, its scene, its variables.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    inspect.add_argument("file", metavar="FILE.h5")
+    inspect.add_argument("--json", action="store_true", help="the same for programs")
+    inspect.set_defaults(call=_inspect)
+
+
+def _inspect(options: argparse.Namespace) -> None:
+    from stiffdice import inspection
+    from stiffdice.io.read import open_file
+
+    dataset = open_file(options.file)
+    print(inspection.as_json(dataset) if options.json else inspection.as_text(dataset, options.file))

@@ -1,0 +1,116 @@
+"""`stiffdice run`: one scene, one file."""
+
+from __future__ import annotations
+
+import argparse
+
+from stiffdice.commands import changes, numbers
+from stiffdice.errors import InputError
+
+EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
+  stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
+  stiffdice run my-cube.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o out.h5
+  stiffdice run my-cube.yaml --simulator mujoco --preset as_written --steps 20000 -o theirs.h5
+
+The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
+its verdict; 2 for bad input.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    run = commands.add_parser(
+        "run",
+        help="run one scene and store its trajectory and verdict",
+        description="Run one scene and store its trajectory and verdict in one HDF5 file.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
+    run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
+    run.add_argument(
+        "--model",
+        default="tumbling",
+        metavar="M",
+        help="vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)",
+    )
+    run.add_argument(
+        "--simulator",
+        default="stiffdice",
+        metavar="NAME",
+        help="stiffdice, or another engine where it is installed: mujoco, pybullet, drake, scipy, octave, numpy "
+        "(default: stiffdice)",
+    )
+    run.add_argument(
+        "--scheme",
+        metavar="NAME",
+        help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
+        "or exact where that is known (default: symplectic_euler; another engine has its own)",
+    )
+    run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
+    run.add_argument(
+        "--tolerance",
+        metavar="X",
+        help="of the error, for a scheme that controls its own (default: 1e-9 of the motion)",
+    )
+    run.add_argument(
+        "--every",
+        metavar="K",
+        help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
+    )
+    run.add_argument(
+        "--ledger",
+        action="store_true",
+        help="book where the energy goes, for every bounce and for the run (takes some times as long)",
+    )
+    changes.add(run)
+    run.set_defaults(call=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    from stiffdice import checks
+    from stiffdice import scene as scenes
+    from stiffdice.io.write import check_target
+
+    scene = scenes.load(options.scene, options.overrides, options.preset)
+    steps = numbers.whole("--steps", options.steps)
+    target = check_target(options.output)
+    if target.exists() and target.samefile(options.scene):
+        raise InputError(f"{target}: is the scene itself; name another file for the output")
+
+    # These take about a second to import; bad input is told before.
+    from stiffdice import ledger, schemes, simulators
+    from stiffdice.io.layout import run_dataset
+    from stiffdice.io.write import write_dataset
+    from stiffdice.progress import Progress
+    from stiffdice.requirement import AUTO
+    from stiffdice.simulate import default_every, simulate
+    from stiffdice.verdict import Verdict
+
+    scheme = simulators.scheme_of(options.simulator, options.scheme)
+    if options.ledger:
+        checks.choice("--ledger: simulator", options.simulator, [simulators.OURS])
+        checks.choice("--ledger: scheme", scheme, ledger.BOOKED)
+    every = default_every(steps) if options.every is None else numbers.whole("--every", options.every)
+    tolerance = schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance)
+    with Progress() as progress:
+        run = simulate(
+            scene,
+            model=options.model,
+            simulator=options.simulator,
+            scheme=scheme,
+            steps=steps,
+            tolerance=tolerance,
+            every=every,
+            progress=progress.show,
+        )
+    dataset = run_dataset(run)
+    if options.ledger:
+        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
+        dataset = dataset.assign(ledger.variables(books))
+    write_dataset(dataset, target)
+    if options.model == AUTO:
+        print(run.model_reason)
+    print(f"{target}: {Verdict(run.verdict[0]).sentence}")
