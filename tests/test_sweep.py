@@ -225,9 +225,9 @@ def test_progress_is_told_column_by_column(tmp_path):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"members": 9}, "members"),
-        ({"early_stop": True}, "early_stop, criteria"),
-        ({"criteria": DEFAULTS | {"trajectory": 1.0}, "horizon": 1.0}, "horizon, horizon_units"),
+        ({"members": 9}, "members, config, config_digest"),
+        ({"early_stop": True}, "early_stop, criteria, config, config_digest"),
+        ({"criteria": DEFAULTS | {"trajectory": 1.0}, "horizon": 1.0}, "horizon, horizon_units, config, config_digest"),
         ({"scene": from_mapping({"cube": {"mass": 2}})}, "scene, scene_digest"),
     ],
 )

@@ -24,6 +24,12 @@ class Gated(NamedTuple):
 
 LAWS = {"ungated": Ungated(), "gated": Gated()}
 
+# The force on a node, as files tell it.
+FORMULA = (
+    "node in the ground by d, leaving it at u_n: normal force f = max(0, S max(0, d) - D u_n), "
+    "if gated only where d > 0; friction -mu f u_t/(|u_t| + 1e-6 r)"
+)
+
 
 @njit
 def _ungated_force(depth: float, speed: float, stiffness: float, damping: float) -> float:

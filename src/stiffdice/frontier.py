@@ -171,6 +171,7 @@ def _dataset(
     }
     attributes = sweep.attrs | {
         "title": "Edges of stability",
+        "kind": "frontier",
         "stiffdice_version": __version__,
         "analysis_code_digest": code_digest("stiffdice.frontier"),
     }

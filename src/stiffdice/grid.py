@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -109,18 +109,28 @@ class Sweep:
         count = -(-len(columns) // self.columns_per_shard)
         return {self._digest(columns[k::count]): columns[k::count] for k in range(count)}
 
-    def _digest(self, columns: Sequence[Column]) -> str:
-        plan = [self.scene.digest, self.model, self.scheme, self.members, self.seed, self.refine, columns]
-        plan += [dict(self._grid), "steps" if self.omega_h is None else "omega_h"]
+    @property
+    def config(self) -> dict[str, Any]:
+        """What the runs of a column depend on besides its ground, the scene and the code, as plain data."""
+        config: dict[str, Any] = {
+            "model": self.model,
+            "model_reason": self.model_reason,
+            "simulator": self.simulator,
+            "scheme": self.scheme,
+            "members": self.members,
+            "seed": self.seed,
+            "refine": self.refine,
+            "omega_h" if self.steps is None else "steps": dict(self._grid),
+        }
         if "trajectory" in self.criteria:
-            plan.append(self.horizon)
-        if self.model_reason != AS_ASKED:  # it is stored
-            plan.append(self.model_reason)
-        if self.simulator != OURS:
-            plan.append({"simulator": self.simulator})
+            config["horizon"] = self.horizon
         # Other tolerances need other runs only where a run stops, or a scan is refined, because of them.
         if self.early_stop or self.refine:
-            plan += [dict(self.criteria), self.early_stop]
+            config |= {"criteria": dict(self.criteria), "early_stop": self.early_stop}
+        return config
+
+    def _digest(self, columns: Sequence[Column]) -> str:
+        plan = [self.scene.digest, self.config, columns]
         return hashlib.sha256(json.dumps(plan, sort_keys=True).encode()).hexdigest()[:12]
 
 

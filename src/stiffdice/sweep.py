@@ -161,6 +161,8 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     code = "stiffdice.sweep", *simulators.code_of(sweep.simulator)
     attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
     attributes |= layout.simulator_attributes(sweep.simulator, simulators.version_of(sweep.simulator))
+    attributes |= layout.config_attributes("shard", sweep.config)
+    attributes["seed"] = sweep.seed
     attributes["model_reason"] = sweep.model_reason
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
     attributes["early_stop"] = int(sweep.early_stop)
@@ -195,6 +197,7 @@ def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.
     whole = whole.isel(cell=order)
     whole.attrs = judged[0].attrs | {
         "title": "Sweep of stiffness and steps",
+        "kind": "sweep",
         "judging_code_digest": code_digest("stiffdice.sweep"),
     }
     return whole

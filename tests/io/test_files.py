@@ -15,9 +15,9 @@ import pytest
 import xarray as xr
 
 from stiffdice import __version__
-from stiffdice.errors import InputError, RefusedError, OutputError
-from stiffdice.io.layout import run_dataset
+from stiffdice.errors import InputError, OutputError, RefusedError
 from stiffdice.io import seal
+from stiffdice.io.layout import run_dataset
 from stiffdice.io.read import open_file
 from stiffdice.io.write import check_target, write_bytes, write_dataset
 from stiffdice.scene import from_mapping

@@ -44,9 +44,9 @@ def code_of_runs(script, simulator, *modules):
     return code if simulator == simulators.OURS else f"{code} {simulators.version_of(simulator)}"
 
 
-def code_of_measuring(script, planned, registry):
+def code_of_measuring(planned, registry):
     """Return the digest of what an experiment or timing depends on, and the versions of the engines that it asks."""
-    code = code_of(script, registry[planned.measure].module, "stiffdice.io.write")
+    code = code_of("measure.py", registry[planned.measure].module, "stiffdice.io.layout", "stiffdice.io.write")
     return " ".join([code, *runners.attributes(planned.options.get("methods", ())).values()])
 
 

@@ -8,7 +8,7 @@ rule experiment:
         "results/{study}/experiments/{experiment}.h5",
     params:
         experiment=lambda wildcards: planned_experiment(wildcards),
-        code=lambda wildcards: code_of_measuring("experiment.py", planned_experiment(wildcards), EXPERIMENTS),
+        code=lambda wildcards: code_of_measuring(planned_experiment(wildcards), EXPERIMENTS),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
     benchmark:
@@ -20,7 +20,7 @@ rule experiment:
     conda:
         "../envs/stiffdice.yaml"
     script:
-        "../scripts/experiment.py"
+        "../scripts/measure.py"
 
 
 # Alone on the machine: it takes every core that the workflow has, though it uses one.
@@ -31,7 +31,7 @@ rule timing:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
         experiment=lambda wildcards: planned_timing(wildcards),
-        code=lambda wildcards: code_of_measuring("timing.py", planned_timing(wildcards), TIMINGS),
+        code=lambda wildcards: code_of_measuring(planned_timing(wildcards), TIMINGS),
     log:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:
@@ -43,4 +43,4 @@ rule timing:
     conda:
         "../envs/stiffdice.yaml"
     script:
-        "../scripts/timing.py"
+        "../scripts/measure.py"

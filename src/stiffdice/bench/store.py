@@ -34,7 +34,8 @@ def dataset_of(
     coordinates = {"round": ("round", rounds, {"long_name": "round, in which the cases take turns", "units": "1"})}
     attributes = layout.provenance_attributes(
         "Benchmark", scene_of("gated", 100_000), "case", "symplectic_euler", "stiffdice.simulate"
-    ) | {
+    )
+    attributes |= layout.config_attributes("bench", {"cases": [case.name for case in cases]}) | {
         "scene_note": "the throw; model, contact law and number of steps are those that the case names",
         "bench_code_digest": code_digest(*BENCHMARKS.values()),
         "missing": "; ".join(f"{part.name}: {part.why}" for part in missing),

@@ -117,6 +117,6 @@ def _variables(runs: list[list[_Made]], reference: Array, coarser: Array) -> dic
 def _coordinates(names: list[str], time: Array) -> dict[str, Any]:
     return {
         "method": layout.method_coordinates([1.0], names)["method"],
-        "time": ("time", time, {"long_name": "time since the launch", "units": "s", "axis": "T"}),
+        "time": ("time", time, {"long_name": "time since the launch", "units": "s"}),
         "axis": ("axis", np.arange(3, dtype=np.int8), layout.AXIS_ATTRIBUTES),
     }

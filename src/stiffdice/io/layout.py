@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiffdice import __version__, simulators, theory
+from stiffdice import __version__, contact, schemes, simulators, theory
 from stiffdice.contact import LAWS
 from stiffdice.criteria import CRITERIA
 from stiffdice.cube import SIGNS
@@ -23,6 +26,9 @@ from stiffdice.verdict import Verdict
 
 CONTACT_ATTRIBUTES = enum_attributes("contact law", list(LAWS))
 VERDICT_ATTRIBUTES = enum_attributes("verdict", [verdict.name.lower() for verdict in Verdict])
+# What numbers and files depend on besides our code.
+_LIBRARIES = ("numpy", "numba", "llvmlite", "h5py", "h5netcdf", "xarray")
+
 AXIS_ATTRIBUTES = enum_attributes("Cartesian axis, z up", ["x", "y", "z"])
 
 
@@ -93,14 +99,31 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, *co
     return {
         "Conventions": "CF-1.11",
         "title": title,
+        "history": f"made by stiffdice {__version__}",
+        "source": f"simulation, model {model}, scheme {scheme}",
+        "references": "Modeling and Simulating Dice (student paper, New York University)",
         "format_version": FORMAT_VERSION,
         "stiffdice_version": __version__,
+        "libraries": libraries(),
         "code_digest": code_digest(*code),
         "scene": json.dumps(scene.as_mapping(), sort_keys=True),
         "scene_digest": scene.digest,
         "model": model,
         "scheme": scheme,
+        "formula": "; ".join([contact.FORMULA, *([schemes.FORMULAS[scheme]] if scheme in schemes.FORMULAS else [])]),
     }
+
+
+def config_attributes(kind: str, config: Mapping[str, Any]) -> dict[str, str]:
+    """Return the attributes that say of which kind a file is, and what was asked: plain data, none of it the scene."""
+    text = json.dumps(config, sort_keys=True)
+    return {"kind": kind, "config": text, "config_digest": hashlib.sha256(text.encode()).hexdigest()}
+
+
+@cache
+def libraries() -> str:
+    """Return the versions of what computes and writes the numbers; Python's own is not among them: it does neither."""
+    return "; ".join(f"{name} {version(name)}" for name in _LIBRARIES)
 
 
 def simulator_attributes(simulator: str, version: str) -> dict[str, str]:
@@ -115,7 +138,7 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         raise ValueError("a run's file holds the trajectory of one member")
     variables: dict[str, Any] = _trajectory_variables(trajectory)
     coordinates: dict[str, Any] = {
-        "time": ("time", trajectory.time, {"long_name": "time since the launch", "units": "s", "axis": "T"}),
+        "time": ("time", trajectory.time, {"long_name": "time since the launch", "units": "s"}),
         "axis": ("axis", np.arange(3, dtype=np.int8), AXIS_ATTRIBUTES),
     }
     if run.model in TURNING:
@@ -131,6 +154,7 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     variables["evaluations"] = ((), run.evaluations[0], EVALUATIONS_ATTRIBUTES)
     code = "stiffdice.simulate", *simulators.code_of(run.simulator)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, *code)
+    attributes |= config_attributes("run", _config(run, trajectory))
     attributes |= simulator_attributes(run.simulator, run.simulator_version) | {
         "model_reason": run.model_reason,
         "steps": run.steps,
@@ -143,6 +167,18 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         "verdict_text": Verdict(run.verdict[0]).sentence,
     }
     return xr.Dataset(variables, coordinates, attributes)
+
+
+def _config(run: Run, trajectory: Trajectory) -> dict[str, Any]:
+    kept = trajectory.step[:2].tolist()
+    return {
+        "model": run.model,
+        "simulator": run.simulator,
+        "scheme": run.scheme,
+        "steps": run.steps,
+        "tolerance": run.tolerance,
+        "every": kept[1] - kept[0] if len(kept) == 2 else run.steps,
+    }
 
 
 def _trajectory_variables(trajectory: Trajectory) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Time-stepping schemes. A scheme is a module with TAG, LAG, `step` and `flight`; one line registers it.
+"""Time-stepping schemes. A scheme is a module with TAG, LAG, FORMULA, `step` and `flight`; one line registers it.
 
 It may also have a `swing`, and say that what `phases.py` takes at once is `proven` for it; otherwise those of
 `closed.py` stand for it, and its contacts are stepped. One that has a `stretch` takes steps until there is something
@@ -36,6 +36,7 @@ _MODULES: dict[str, Any] = {
 }
 
 SCHEMES = {name: module.TAG for name, module in _MODULES.items()}
+FORMULAS: dict[str, str] = {name: module.FORMULA for name, module in _MODULES.items()}
 
 
 def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:

@@ -49,6 +49,12 @@ class Event(NamedTuple):
 
 TAG = Event()
 
+# One step of h, as files tell it.
+FORMULA = (
+    "exact flights; contacts by Dormand and Prince's method of order 8 from one event to the next, "
+    "extrapolated linearly implicit Euler where friction holds a node"
+)
+
 # The velocity is that at the stored place.
 LAG = 0.0
 

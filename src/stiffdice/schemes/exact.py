@@ -40,6 +40,9 @@ class Exact(NamedTuple):
 
 TAG = Exact()
 
+# One step of h, as files tell it.
+FORMULA = "parabolas and damped oscillations in closed form, from one event to the next"
+
 # The velocity is that at the stored place.
 LAG = 0.0
 

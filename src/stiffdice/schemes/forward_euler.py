@@ -21,6 +21,9 @@ class ForwardEuler(NamedTuple):
 
 TAG = ForwardEuler()
 
+# One step of h, as files tell it.
+FORMULA = "x += h u; nodes turned by h L/I; then u += h a; L += h torque, all of the old state"
+
 # The velocity of a step is the path's slope half a step after it: x_(n+1) = x_n + h u_n.
 LAG = -0.5
 

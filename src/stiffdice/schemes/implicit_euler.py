@@ -42,6 +42,9 @@ class ImplicitEuler(NamedTuple):
 
 TAG = ImplicitEuler()
 
+# One step of h, as files tell it.
+FORMULA = "(M - h dF/dv - h^2 dF/dx) dv = h (F + h dF/dx v), F linear about x + h v; v += dv; x += h v"
+
 # The velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n.
 LAG = 0.5
 

@@ -28,6 +28,9 @@ class RK4(NamedTuple):
 
 TAG = RK4()
 
+# One step of h, as files tell it.
+FORMULA = "classical Runge-Kutta of order 4 for x, u and L; nodes turned by Munthe-Kaas' method of the same order"
+
 # The velocity is the path's slope at the place.
 LAG = 0.0
 

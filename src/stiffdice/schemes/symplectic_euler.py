@@ -22,6 +22,9 @@ class SymplecticEuler(NamedTuple):
 
 TAG = SymplecticEuler()
 
+# One step of h, as files tell it.
+FORMULA = "u += h a; L += h torque; x += h u; nodes turned by h L/I"
+
 # The velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n.
 LAG = 0.5
 

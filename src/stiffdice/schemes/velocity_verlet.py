@@ -26,6 +26,12 @@ class VelocityVerlet(NamedTuple):
 
 TAG = VelocityVerlet()
 
+# One step of h, as files tell it.
+FORMULA = (
+    "u += h a/2; L += h torque/2; x += h u; nodes turned by h L/I; u += h a/2; L += h torque/2, predicted and "
+    "corrected once"
+)
+
 # The velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2.
 LAG = 0.0
 
