@@ -24,7 +24,7 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
     if "scene" in attributes:
         scene = yaml.safe_dump(json.loads(attributes["scene"]), sort_keys=False, default_flow_style=None, width=100)
         lines += ["", "scene", *(f"  {line}" for line in scene.splitlines())]
-    if "scheme_work" in dataset:
+    if set(_BOOKED) <= set(dataset.variables):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
     lines += ["", "variables", *_variables(dataset)]
     return "\n".join(lines)

@@ -80,7 +80,8 @@ def measure(
         "first_contact": _first_contact(bare, coarse),
     }
     numbers = np.array([found[name] for name in LIMITS])
-    unit = "that of limit_units"
+    # Each limit has a unit of its own, which no `units` could say of all.
+    unit = "in the unit that limit_units names"
     attributes = layout.provenance_attributes(
         "Limits of double precision", bare, MODEL, SCHEME, "stiffdice.experiments.precision"
     )
@@ -94,8 +95,8 @@ def measure(
     }
     return xr.Dataset(
         {
-            "predicted": ("limit", numbers[:, 0], {"long_name": "limit by its formula", "units": unit}),
-            "measured": ("limit", numbers[:, 1], {"long_name": "limit found in this code", "units": unit}),
+            "predicted": ("limit", numbers[:, 0], {"long_name": f"limit by its formula, {unit}", "units": "1"}),
+            "measured": ("limit", numbers[:, 1], {"long_name": f"limit found in this code, {unit}", "units": "1"}),
         },
         {"limit": ("limit", np.arange(len(LIMITS), dtype=np.int8), enum_attributes("limit", list(LIMITS)))},
         attributes,

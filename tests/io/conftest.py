@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import pytest
+
+from stiffdice import frontier, ledger
+from stiffdice.experiments import chatter
+from stiffdice.io.layout import config_attributes, run_dataset
+from stiffdice.io.write import write_dataset
+from stiffdice.scene import from_mapping
+from stiffdice.simulate import simulate
+
+CHATTER = {"friction": [0.075], "step_size": [1e-6, 1e-4]}
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory, shards, collected):
+    """A file of each kind that data are in, as the workflow writes them: kind → path."""
+    folder = tmp_path_factory.mktemp("written")
+    scene = from_mapping({"launch": {"angular_momentum": [0.1, 0.2, 0.3]}})
+    books = ledger.keep(scene, model="tumbling", scheme="symplectic_euler", steps=3000)
+    run = run_dataset(simulate(scene, steps=3000, every=50)).assign(ledger.variables(books))
+    found = chatter.measure(from_mapping({}), **CHATTER)
+    datasets = {
+        "run": run,
+        "sweep": collected,
+        "frontier": frontier.find(collected),
+        "experiment": found.assign_attrs(config_attributes("experiment", {"measure": "chatter", "options": CHATTER})),
+    }
+    for kind, dataset in datasets.items():
+        write_dataset(dataset, folder / f"{kind}.h5")
+    return {kind: folder / f"{kind}.h5" for kind in datasets} | {"shard": shards[0]}
