@@ -12,7 +12,10 @@ import yaml
 
 from stiffdice.io.enums import meanings_of
 
-_LONG = ("scene", "scene_digest", "code_digest", "analysis_code_digest", "title", "Conventions")
+_LONG = (
+    *("title", "Conventions", "history", "source", "references", "scene"),
+    *("scene_digest", "config_digest", "code_digest", "judging_code_digest", "analysis_code_digest"),
+)
 
 
 def as_text(dataset: xr.Dataset, name: str) -> str:
