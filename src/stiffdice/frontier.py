@@ -7,6 +7,7 @@ What is reported is the scan itself and its two edges.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -62,21 +63,21 @@ def power_law(stiffness: Values, steps: Values) -> dict[str, float]:
     `factor`, `scatter` (standard deviation of the residuals), `centre` (geometric mean of the stiffnesses) and
     `points`. NaN with fewer than three points.
     """
-    known = np.isfinite(steps)
-    count = np.count_nonzero(known)
+    points = [(math.log10(x), math.log10(y)) for x, y in zip(stiffness, steps, strict=True) if np.isfinite(y)]
+    count = len(points)
     if count < 3:
         return dict.fromkeys(FIT, np.nan) | {"points": float(count)}
-    x, y = np.log10(stiffness[known]), np.log10(steps[known])
-    centred = x - x.mean()
-    slope = float(centred @ y / (centred @ centred))
-    residual = y - y.mean() - slope * centred
-    scatter = float(np.sqrt(residual @ residual / (count - 2)))
+    # Sums that are exact, and logarithms one by one: NumPy's own differ in the last digit from processor to processor.
+    centre, middle = (math.fsum(values) / count for values in zip(*points, strict=True))
+    spread = math.fsum((x - centre) ** 2 for x, _ in points)
+    slope = math.fsum((x - centre) * y for x, y in points) / spread
+    scatter = math.sqrt(math.fsum((y - middle - slope * (x - centre)) ** 2 for x, y in points) / (count - 2))
     return {
         "exponent": slope,
-        "exponent_error": scatter / float(np.sqrt(centred @ centred)),
-        "factor": float(10 ** (y.mean() - slope * x.mean())),
+        "exponent_error": scatter / math.sqrt(spread),
+        "factor": 10 ** (middle - slope * centre),
         "scatter": scatter,
-        "centre": float(10 ** x.mean()),
+        "centre": 10**centre,
         "points": float(count),
     }
 
