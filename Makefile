@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff peers study report bench test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff peers study report archive bench test test-fast lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,8 +40,11 @@ peers: $(READY)  ## the engines that are installed beside stiffdice, into result
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
 
-report: paper  ## results/paper/report.html: every figure with its caption, code and configuration
-	@$(BIN)/snakemake --cores $(CORES) paper --report results/paper/report.html
+report: study  ## results/NAME/report.html: every figure with its caption, code and configuration: make report STUDY=NAME
+	@$(BIN)/snakemake --cores $(CORES) study --config 'study=$(STUDY)' --report 'results/$(STUDY)/report.html'
+
+archive: report  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
+	@$(BIN)/stiffdice archive '$(STUDY)'
 
 bench: $(READY)  ## measure how fast it is, into results/bench/, and compare with the last time
 	@$(BIN)/stiffdice bench

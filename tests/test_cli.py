@@ -60,7 +60,7 @@ def test_another_simulator_makes_the_same_file(stiffdice):
     with xr.open_dataset("ours.h5") as ours, xr.open_dataset("theirs.h5") as theirs:
         xr.testing.assert_allclose(theirs, ours, rtol=1e-9)
         assert {key for key in ours.attrs if str(ours.attrs[key]) != str(theirs.attrs[key])} == {
-            *("simulator", "simulator_version", "code_digest"),
+            *("simulator", "simulator_version", "code_digest", "config", "config_digest"),
         }
         assert theirs.attrs["simulator_version"] == f"numpy {np.__version__}"
         assert ours.attrs["simulator_version"] == f"stiffdice {ours.attrs['stiffdice_version']}"

@@ -1,0 +1,73 @@
+"""CITATION.cff: how this project wants to be cited (Citation File Format 1.2.0, https://doi.org/10.5281/zenodo.5171937)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stiffdice.errors import InputError
+from stiffdice.io import yaml_file
+
+_NEEDED = ("title", "version", "date-released", "license", "authors")
+
+
+class Author(NamedTuple):
+    """A person or, if there are no family names, an organisation; url: an ORCID or a web site, if there is one."""
+
+    name: str
+    is_person: bool
+    url: str | None
+    affiliation: str | None
+
+
+class Citation(NamedTuple):
+    """What a citation file says. url: of the project, if it has one; references: title and authors of each work."""
+
+    title: str
+    version: str
+    released: str
+    licence: str
+    url: str | None
+    abstract: str
+    keywords: tuple[str, ...]
+    authors: tuple[Author, ...]
+    references: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def load(cls, path: Path) -> Citation:
+        """Return what the file says; raises InputError naming the file and the key that is missing."""
+        data = yaml_file.load(path)
+        for key in _NEEDED:
+            if not isinstance(data, dict) or key not in data:
+                raise InputError(f"{path}: {key} is missing")
+        url = data.get("repository-code", data.get("url"))
+        return cls(
+            str(data["title"]),
+            str(data["version"]),
+            str(data["date-released"]),
+            str(data["license"]),
+            url,
+            " ".join(str(data.get("abstract", "")).split()),
+            tuple(data.get("keywords", ())),
+            tuple(map(_author, data["authors"])),
+            tuple((work["title"], ", ".join(_author(who).name for who in work["authors"])) for work in _works(data)),
+        )
+
+    @property
+    def sentence(self) -> str:
+        """How to cite it, in one line."""
+        authors = ", ".join(author.name for author in self.authors)
+        return f"{authors} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
+
+
+def _works(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return list(data.get("references", ()))
+
+
+def _author(entry: Mapping[str, Any]) -> Author:
+    if "name" in entry:
+        return Author(entry["name"], False, entry.get("website"), None)
+    parts = (entry.get(key) for key in ("given-names", "name-particle", "family-names", "name-suffix"))
+    name = " ".join(part for part in parts if part)
+    return Author(name, True, entry.get("orcid", entry.get("website")), entry.get("affiliation"))

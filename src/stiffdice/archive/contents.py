@@ -1,0 +1,193 @@
+"""What goes into an archive: the files of a study and of the project that made it, all there and whole."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stiffdice import results
+from stiffdice.errors import InputError, RefusedError
+from stiffdice.io import yaml_file
+from stiffdice.io.read import open_file
+from stiffdice.study import Study
+
+# By their names; the order is that of every list of sizes.
+KINDS = {
+    "data": "data",
+    "figures": "figures and tables",
+    "report": "report",
+    "logs": "logs and benchmarks",
+    "config": "studies and scenes",
+    "code": "code and workflow",
+    "lock": "locked versions",
+    "about": "text for people",
+}
+
+# Of the project, whole.
+_FILES = {
+    "CHANGELOG.md": "about",
+    "CITATION.cff": "about",
+    "LICENSE": "about",
+    "Makefile": "code",
+    "README.md": "about",
+    "Snakefile": "code",
+    "pyproject.toml": "code",
+    "results/README.md": "about",
+}
+_TREES = {"requirements": "lock", "src": "code", "workflow": "code"}
+
+# What a job in progress, an interrupted one, a damaged result or Python leaves behind, and archives themselves.
+_LEFT_OUT = (".part", ".damaged", ".pyc", ".zip", ".egg-info")
+
+# The same on every system; no system takes one for another, or for a path.
+_NAME = re.compile(r"[A-Za-z0-9_+-]([A-Za-z0-9 _+.-]*[A-Za-z0-9_+-])?")
+
+
+class File(NamedTuple):
+    """A file to be packed: its path in the archive, its kind, where it lies now, and the result that it is part of."""
+
+    path: str
+    kind: str
+    source: Path
+    result: results.Result | None = None
+
+
+class Found(NamedTuple):
+    """What the data say: of each shard how many runs it holds, and every library or engine with its version."""
+
+    runs: Mapping[str, int]
+    software: tuple[tuple[str, str], ...]
+
+
+def of(study: Study, root: Path) -> list[File]:
+    """Return the files of an archive of a study, sorted by their paths.
+
+    root: the project's folder. Raises InputError naming the first file that is missing or cannot be packed.
+    """
+    files = [*_project(root), *_config(study.name, root), *_results(study, root)]
+    by_path: dict[str, File] = {}
+    for file in files:
+        for part in file.path.split("/"):
+            if not _NAME.fullmatch(part):
+                raise InputError(f"{file.path}: allowed in names in an archive are letters, digits and _ + - . between")
+        other = by_path.setdefault(file.path.lower(), file)
+        if other.path != file.path:
+            raise InputError(f"{file.path}: some systems take it for {other.path}; an archive cannot hold both")
+    return sorted(by_path.values())
+
+
+def scenes_of(study: str, root: Path) -> list[str]:
+    """Return the scenes that config/STUDY.yaml names, relative to the project; raises InputError for one outside."""
+    path = f"config/{study}.yaml"
+    found: dict[str, None] = {}
+    data: Mapping[str, Any] = yaml_file.load(root / path)
+    for kind in ("runs", "sweeps", "experiments", "timings"):
+        for name, part in data.get(kind, {}).items():
+            scene = os.path.normpath(part["scene"])
+            if Path(scene).is_absolute() or scene.startswith(".."):
+                raise InputError(
+                    f"{path}: {kind}.{name}.scene = {part['scene']}: allowed in an archive is a file of the project, "
+                    "by its relative path"
+                )
+            found[Path(scene).as_posix()] = None
+    return list(found)
+
+
+def read(files: list[File]) -> Found:
+    """Read every HDF5 file and return what the data say; raises RefusedError naming the first that is not whole."""
+    runs: dict[str, int] = {}
+    software: set[tuple[str, str]] = set()
+    for file in files:
+        if file.result is None:
+            continue
+        if file.source.stat().st_size == 0:
+            raise RefusedError(f"{file.path}: empty; remove it and make it again")
+        if file.source.suffix != ".h5":
+            continue
+        dataset = open_file(file.source)
+        if file.result.stage == "shard":
+            runs[file.path] = dataset.sizes["cell"] * dataset.sizes["member"]
+        software.update(_software(dataset.attrs))
+    return Found(runs, tuple(sorted(software)))
+
+
+def _software(attributes: Mapping[Any, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what a file says of who made it, with versions: this program, libraries, other engines."""
+    for key in ("libraries", "engine_versions", "simulator_version"):
+        for entry in str(attributes.get(key, "")).split("; "):
+            name, _, version = entry.partition(" ")
+            if version:
+                yield name, version
+    if "stiffdice_version" in attributes:
+        yield "stiffdice", str(attributes["stiffdice_version"])
+
+
+def _project(root: Path) -> Iterator[File]:
+    for path, kind in _FILES.items():
+        if not (root / path).is_file():
+            raise InputError(f"{path}: not here; an archive is made in the project's folder")
+        yield File(path, kind, root / path)
+    for tree, kind in _TREES.items():
+        yield from _tree(root, tree, kind)
+    for file in _tree(root, "docs", "about"):
+        if file.path.endswith(".md"):
+            yield file
+
+
+def _config(study: str, root: Path) -> Iterator[File]:
+    for path in scenes_of(study, root):
+        if (root / path).is_symlink():
+            raise InputError(f"{path}: a link; an archive holds files only")
+        yield File(path, "config", root / path)
+    for file in _tree(root, "config", "config"):
+        # Somebody's own; Git leaves them out, too.
+        if not file.path.startswith("config/my-") or file.path == f"config/{study}.yaml":
+            yield file
+
+
+def _tree(root: Path, top: str, kind: str) -> Iterator[File]:
+    """Yield the files in a folder of the project and below it; raises InputError for a link among them."""
+    if not (root / top).is_dir():
+        raise InputError(f"{top}: not here; an archive is made in the project's folder")
+    for folder, folders, names in os.walk(root / top):
+        folders[:] = sorted(name for name in folders if not _is_left_out(name))
+        for name in sorted([*names, *(name for name in folders if (Path(folder) / name).is_symlink())]):
+            source = Path(folder) / name
+            path = source.relative_to(root).as_posix()
+            if _is_left_out(name):
+                continue
+            if source.is_symlink():
+                raise InputError(f"{path}: a link; an archive holds files only")
+            yield File(path, kind, source)
+
+
+def _is_left_out(name: str) -> bool:
+    return name.startswith(".") or name == "__pycache__" or name.endswith(_LEFT_OUT)
+
+
+def _results(study: Study, root: Path) -> Iterator[File]:
+    top = f"results/{study.name}"
+    planned = [(f"{top}/{path}", result) for result in results.of(study) for path in result.files]
+    missing = [path for path, _ in planned if not (root / path).is_file()]
+    if missing:
+        raise InputError(
+            f"{missing[0]}: not there, as {len(missing)} of {len(planned)} files of this study; "
+            f"make study STUDY={study.name} makes what is missing"
+        )
+    for path, result in planned:
+        yield File(path, _kind(path, result), root / path, result)
+    for result in results.of(study):
+        for side in (f"{top}/{result.log}", f"{top}/{result.benchmark}"):
+            if (root / side).is_file():
+                yield File(side, "logs", root / side)
+    if (root / top / "report.html").is_file():
+        yield File(f"{top}/report.html", "report", root / top / "report.html")
+
+
+def _kind(path: str, result: results.Result) -> str:
+    if result.stage in {"figure", "animation", "table"}:
+        return "figures"
+    return "logs" if result.stage == "timings" else "data"

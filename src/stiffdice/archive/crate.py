@@ -1,0 +1,366 @@
+"""What an archive says of itself to programs: an RO-Crate 1.1 that keeps to Workflow Run Crate 0.5.
+
+The specifications: https://w3id.org/ro/crate/1.1, https://w3id.org/ro/wfrun/workflow/0.5 (and with it
+https://w3id.org/ro/wfrun/process/0.5 and https://w3id.org/workflowhub/workflow-ro-crate/1.0).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+from stiffdice import __version__
+from stiffdice.archive import manifest
+from stiffdice.archive.citation import Author, Citation
+from stiffdice.archive.contents import KINDS, File
+from stiffdice.archive.sizes import Sizes, sentence
+from stiffdice.errors import RefusedError
+from stiffdice.results import Result
+from stiffdice.study import Study
+
+NAME = "ro-crate-metadata.json"
+
+_PROFILES = {
+    "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
+    "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
+}
+# Schema.org has had this property since its version 12, RO-Crate 1.1 goes by version 10.
+_TERMS = {"sha256": "http://schema.org/sha256"}
+_WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
+_PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
+_NETCDF = "https://docs.unidata.ucar.edu/netcdf-c/current/file_format_specifications.html"
+
+_FORMATS = {
+    ".cff": "application/yaml",
+    ".csv": "text/csv",
+    ".gif": "image/gif",
+    ".h5": "application/x-hdf5",
+    ".html": "text/html",
+    ".md": "text/markdown",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".toml": "application/toml",
+    ".txt": "text/plain",
+    ".yaml": "application/yaml",
+}
+_FOLDERS = {
+    "config": "The studies, and the scenes that they name",
+    "docs": "How things are measured, what was found, and what is in the files",
+    "requirements": "Every package in its version, with digests: what .venv is made from",
+    "src/stiffdice": "The library: the simulator, its judgement, its figures",
+    "workflow": "Rules, scripts and schema of the workflow",
+}
+_HOMEPAGES = {
+    "drake": "https://drake.mit.edu",
+    "h5netcdf": "https://h5netcdf.org",
+    "h5py": "https://www.h5py.org",
+    "llvmlite": "https://llvmlite.readthedocs.io",
+    "mujoco": "https://mujoco.org",
+    "numba": "https://numba.pydata.org",
+    "numpy": "https://numpy.org",
+    "octave": "https://octave.org",
+    "pybullet": "https://pybullet.org",
+    "scipy": "https://scipy.org",
+    "xarray": "https://xarray.dev",
+}
+
+
+class Facts(NamedTuple):
+    """What an archive says of itself is told from.
+
+    scenes: paths of those that the study names. digests: size in bytes and SHA-256 of every file, by its path.
+    software: names and versions that the data give. span: when the first job began and the last one ended, if known.
+    agent: who ran it, if that is to be said.
+    """
+
+    study: Study
+    citation: Citation
+    files: Sequence[File]
+    scenes: Sequence[str]
+    digests: Mapping[str, tuple[int, str]]
+    sizes: Sizes
+    software: Sequence[tuple[str, str]]
+    span: tuple[datetime, datetime] | None
+    agent: str | None
+
+    @property
+    def title(self) -> str:
+        """What the archive is, in one line."""
+        return f"stiffdice study {self.study.name}: {self.study.question}"
+
+    @property
+    def published(self) -> str:
+        """The day on which the last result was made or, if that is not known, the program released."""
+        return self.span[1].date().isoformat() if self.span else self.citation.released
+
+
+def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
+    """Return when the first job began and when the last one ended, to the second, as their benchmarks tell.
+
+    None if there are none, or if they come from a zip file, which keeps no times. Raises RefusedError naming what
+    should be a benchmark and is none.
+    """
+    begun, ended = [], []
+    for file in files:
+        if file.kind != "logs" or file.source.suffix != ".tsv":
+            continue
+        end = file.source.stat().st_mtime
+        try:
+            begun.append(end - float(file.source.read_text(encoding="utf-8").splitlines()[1].split("\t")[0]))
+        except (IndexError, ValueError):
+            raise RefusedError(f"{file.path}: not a benchmark of Snakemake; remove it") from None
+        ended.append(end)
+    if not ended or datetime.fromtimestamp(min(ended), UTC).year <= 1980:
+        return None
+    first, last = (datetime.fromtimestamp(int(time), UTC) for time in (min(begun), max(ended)))
+    return first, last
+
+
+def describe(result: Result, suffix: str, study: Study) -> str:
+    """Return in one line what a file of a result is."""
+    if result.stage == "shard":
+        return f"Every run of some cells of the sweep {result.name.split('/')[0]}"
+    if result.stage == "collect":
+        return f"{'Which shard holds what' if suffix == '.csv' else 'All cells, judged'}, of the sweep {result.name}"
+    if result.stage in {"figure", "animation"}:
+        return study.figures[result.name].title
+    if result.stage == "table":
+        return study.tables[result.name].title
+    return {
+        "trajectory": f"The trajectory of the run {result.name}",
+        "experiment": f"What the experiment {result.name} measured",
+        "timings": f"Wall times of {result.name}, with the machine they were taken on: differ between two rebuilds",
+        "frontier": f"The edges of stability of the sweep {result.name}",
+    }[result.stage]
+
+
+def metadata(facts: Facts) -> str:
+    """Return the text of ro-crate-metadata.json; it says nothing that the same files would not say again."""
+    from rocrate.rocrate import ROCrate
+
+    crate = ROCrate(version="1.1")
+    _Crate(crate, facts).fill()
+    graph = crate.metadata.generate()
+    entities = sorted((_compact(entity) for entity in graph["@graph"]), key=lambda entity: _rank(entity["@id"]))
+    return json.dumps({**graph, "@graph": entities}, indent=1, sort_keys=True) + "\n"
+
+
+def _rank(identifier: str) -> tuple[int, str]:
+    """Return where an entity stands: what people look for comes first."""
+    first = (NAME, "./", "Snakefile", "#run")
+    return (first.index(identifier) if identifier in first else len(first), identifier)
+
+
+def _compact(entity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entity without lists of one, as RO-Crate 1.1 recommends (appendix JSON-LD)."""
+    return {key: value[0] if isinstance(value, list) and len(value) == 1 else value for key, value in entity.items()}
+
+
+class _Crate:
+    """Fills a crate: each method adds entities, and returns those that others refer to."""
+
+    def __init__(self, crate: Any, facts: Facts) -> None:
+        self.crate = crate
+        self.facts = facts
+
+    def fill(self) -> None:
+        """Add everything."""
+        facts, root = self.facts, self.crate.root_dataset
+        self.crate.metadata.extra_terms.update(_TERMS)
+        workflow = self._workflow()
+        self._preview()
+        inputs = [self._file(path) for path in (f"config/{facts.study.name}.yaml", *facts.scenes)]
+        outputs = self._results()
+        for path in ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md"):
+            self._file(path)
+        self._file("README.md", about=root)
+        self._folders()
+        listing = {"name": manifest.NAME, "encodingFormat": "text/plain"}
+        told = "The SHA-256 of every file but itself: sha256sum --check"
+        self.crate.add_file(dest_path=manifest.NAME, properties={**listing, "description": told})
+        run = self._run(workflow, inputs, outputs)
+        self._describe(root, run)
+
+    def _add(self, identifier: str, kind: str, **properties: Any) -> Any:
+        """Add an entity that is no file, and return it; properties without a value are left out."""
+        from rocrate.model.contextentity import ContextEntity
+
+        told = {key: value for key, value in properties.items() if value not in (None, [], "")}
+        return self.crate.add(ContextEntity(self.crate, identifier, properties={"@type": kind, **told}))
+
+    def _describe(self, root: Any, run: Any) -> None:
+        facts = self.facts
+        licence = f"https://spdx.org/licenses/{facts.citation.licence}"
+        told = {
+            "name": facts.title,
+            "description": " ".join(
+                [
+                    f"{facts.study.question} A study of stiffdice {facts.citation.version}: its data, figures, report, "
+                    "configuration, workflow, code and locked versions. 'stiffdice verify' checks it, 'stiffdice "
+                    f"rebuild' makes it again. {sentence(facts.sizes)}".strip(),
+                    *(f"{line}." for line in facts.study.left_out),
+                ]
+            ),
+            "datePublished": facts.published,
+            "version": facts.citation.version,
+            "keywords": ", ".join(facts.citation.keywords),
+            "license": self._add(
+                licence,
+                "CreativeWork",
+                name=facts.citation.licence,
+                description=f"{facts.citation.licence} licence; its text is in the file LICENSE.",
+                url=licence,
+            ),
+            "author": [self._author(k, author) for k, author in enumerate(facts.citation.authors, 1)],
+            "citation": [
+                self._add(f"#reference-{k}", "CreativeWork", name=title, description=f"By {authors}")
+                for k, (title, authors) in enumerate(facts.citation.references, 1)
+            ],
+            "conformsTo": [
+                self._add(identifier, "CreativeWork", name=name, version=number)
+                for identifier, (name, number) in _PROFILES.items()
+            ],
+            "mentions": [run],
+            "size": self._sizes(),
+        }
+        for key, value in told.items():
+            if value:
+                root[key] = value
+
+    def _author(self, number: int, author: Author) -> Any:
+        kind = "Person" if author.is_person else "Organization"
+        affiliation = author.affiliation and self._add(
+            f"#affiliation-{number}", "Organization", name=author.affiliation
+        )
+        return self._add(
+            author.url or f"#author-{number}", kind, name=author.name, url=author.url, affiliation=affiliation or None
+        )
+
+    def _sizes(self) -> list[Any]:
+        sizes = self.facts.sizes
+        kinds = [
+            self._add(f"#size-{kind}", "QuantitativeValue", name=KINDS[kind], value=size.bytes, unitText="bytes")
+            for kind, size in sizes.kinds.items()
+        ]
+        each = round(sizes.per_run(), 1) if sizes.runs else None
+        runs = self._add("#size-runs", "QuantitativeValue", name="runs in shards", value=sizes.runs, unitText="runs")
+        run = self._add(
+            "#size-run", "QuantitativeValue", name="a run in the shards", value=each, unitText="bytes per run"
+        )
+        return [*kinds, runs, *([run] if sizes.runs else [])]
+
+    def _preview(self) -> None:
+        told = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
+        self._add("ro-crate-preview.html", "CreativeWork", **told)
+
+    def _workflow(self) -> Any:
+        study, where = self.facts.study.name, self.facts.citation.url or {"@id": "README.md"}
+        value = self._add("#study-given", "PropertyValue", name="study", value=study)
+        given = self._parameter("study", "Text", "Which study in config/ is run", value)
+        made = self._parameter("results", "Dataset", "Everything that the study asks for", {"@id": f"results/{study}/"})
+        value["exampleOfWork"] = given
+        try:
+            number = version("snakemake")
+        except PackageNotFoundError:
+            number = None
+        workflow = self.crate.add_workflow(
+            dest_path="Snakefile", main=True, lang="snakemake", lang_version=number, properties=self._said("Snakefile")
+        )
+        workflow["name"] = "stiffdice: how many time steps a stiff ground costs"
+        workflow["description"] = "From a study to runs, shards, sweeps, frontiers, figures and tables."
+        workflow["version"] = self.facts.citation.version
+        workflow["url"] = where
+        workflow["encodingFormat"] = "text/plain"
+        workflow["conformsTo"] = {"@id": _WORKFLOW_PROFILE}
+        workflow["input"] = [given]
+        workflow["output"] = [made]
+        workflow["softwareRequirements"] = self._software()
+        self._add(_WORKFLOW_PROFILE, "CreativeWork", name="Bioschemas ComputationalWorkflow", version="1.0-RELEASE")
+        self._add(_PARAMETER_PROFILE, "CreativeWork", name="Bioschemas FormalParameter", version="1.0-RELEASE")
+        return workflow
+
+    def _parameter(self, name: str, kind: str, description: str, example: Any) -> Any:
+        return self._add(
+            f"#{name}",
+            "FormalParameter",
+            name=name,
+            additionalType=kind,
+            description=description,
+            workExample=example,
+            conformsTo={"@id": _PARAMETER_PROFILE},
+        )
+
+    def _software(self) -> list[Any]:
+        """Add whatever made the numbers, in the versions that the files of results give."""
+        entities = []
+        for name, number in sorted({("stiffdice", __version__), *self.facts.software}):
+            ours = name == "stiffdice"
+            home = self.facts.citation.url if ours else _HOMEPAGES.get(name)
+            identifier = f"{home}#{quote(number)}" if home else f"#{quote(name)}-{quote(number)}"
+            url = home or ({"@id": "README.md"} if ours else None)
+            entities.append(self._add(identifier, "SoftwareApplication", name=name, softwareVersion=number, url=url))
+        return entities
+
+    def _said(self, path: str) -> dict[str, Any]:
+        """Return size, digest and format of a file."""
+        size, sha256 = self.facts.digests[path]
+        suffix = PurePosixPath(path).suffix
+        media = _FORMATS.get(suffix, "text/plain")
+        told: dict[str, Any] = {"name": PurePosixPath(path).name, "contentSize": str(size), "sha256": sha256}
+        return told | {"encodingFormat": [media, {"@id": _NETCDF}] if suffix == ".h5" else media}
+
+    def _file(self, path: str, **properties: Any) -> Any:
+        return self.crate.add_file(dest_path=quote(path), properties=self._said(path) | properties)
+
+    def _folders(self) -> None:
+        for path, description in _FOLDERS.items():
+            self._folder(path, description)
+        self._add(_NETCDF, "WebSite", name="netCDF-4 on HDF5")
+
+    def _folder(self, path: str, description: str, **properties: Any) -> Any:
+        told = {"name": PurePosixPath(path).name, "description": description}
+        return self.crate.add_dataset(dest_path=f"{path}/", properties=told | properties)
+
+    def _results(self) -> list[Any]:
+        """Add everything below results/STUDY/, and return what the workflow made."""
+        facts = self.facts
+        top = f"results/{facts.study.name}"
+        made, sides = [], []
+        for file in facts.files:
+            if file.result is not None:
+                told = describe(file.result, PurePosixPath(file.path).suffix, facts.study)
+                made.append(self._file(file.path, description=told))
+            elif file.kind == "report":
+                told = "Snakemake's report: every figure with its caption, code and configuration, and when jobs ran"
+                sides.append(self._file(file.path, description=told, about={"@id": "#run"}))
+        differ = "differs between two rebuilds"
+        for name, told in (("logs", f"What every job said; {differ}"), ("benchmarks", f"How long it took; {differ}")):
+            if any(file.path.startswith(f"{top}/{name}/") for file in facts.files):
+                sides.append(self._folder(f"{top}/{name}", told, about={"@id": "#run"}))
+        whole = self._folder(
+            top, "All results of the study", exampleOfWork={"@id": "#results"}, hasPart=[*made, *sides]
+        )
+        return [whole, *made]
+
+    def _run(self, workflow: Any, inputs: list[Any], outputs: list[Any]) -> Any:
+        facts = self.facts
+        begun, ended = (time.isoformat() for time in facts.span) if facts.span else (None, None)
+        return self._add(
+            "#run",
+            "CreateAction",
+            name=f"The run of the study {facts.study.name}",
+            description=f"snakemake study --config study={facts.study.name}",
+            actionStatus="http://schema.org/CompletedActionStatus",
+            instrument=workflow,
+            object=[{"@id": "#study-given"}, *inputs],
+            result=outputs,
+            startTime=begun,
+            endTime=ended,
+            agent=self._add("#agent", "Person", name=facts.agent) if facts.agent else None,
+        )

@@ -1,0 +1,104 @@
+"""A finished study in a project of its own, made by the library as the workflow would make it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import yaml
+
+from stiffdice import figures, frontier, results, study, sweep
+from stiffdice import scene as scenes
+from stiffdice.catalogue import TABLES
+from stiffdice.io.layout import run_dataset
+from stiffdice.io.read import open_file, parts
+from stiffdice.io.write import write_bytes, write_dataset
+from stiffdice.simulate import simulate
+
+ROOT = Path(__file__).parent.parent.parent
+TINY = {
+    "question": "Is <all> of it packed?",
+    "runs": {
+        "fall": {
+            "scene": "config/scenes/figure-09.yaml",
+            "presets": ["as_listed"],
+            "model": "sliding",
+            "steps": 10000,
+            "every": 500,
+        }
+    },
+    "sweeps": {
+        "steps": {
+            "scene": "my-scene.yaml",
+            "model": "sliding",
+            "contact": ["ungated"],
+            "stiffness": {"from": 1e3, "to": 1e4, "count": 3},
+            "omega_h": {"from": 3.0, "to": 0.5, "count": 5},
+            "members": 4,
+            "columns_per_shard": 2,
+        }
+    },
+    "figures": {"position": {"draw": "position", "run": "fall", "title": "Position & place"}},
+    "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
+}
+AN_HOUR = 1_800_000_000  # seconds since 1970: 2027-01-15 08:00:00 UTC
+
+
+def project(folder: Path) -> Path:
+    """Return a copy of the project without results, with the study `tiny` in it."""
+    for name in ("workflow", "config", "docs", "requirements"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+    # A few sources stand for all, so that tests do not digest and deflate them again and again.
+    (folder / "src/stiffdice/io").mkdir(parents=True)
+    for name in ("__init__.py", "errors.py", "io/read.py"):
+        shutil.copy(ROOT / "src/stiffdice" / name, folder / "src/stiffdice" / name)
+    for path in ROOT.iterdir():
+        if path.is_file() and not path.name.startswith("."):
+            shutil.copy(path, folder)
+    (folder / "profiles").symlink_to("workflow/profiles")
+    (folder / "results").mkdir()
+    shutil.copy(ROOT / "results/README.md", folder / "results")
+    shutil.copy(ROOT / "config/scenes/figure-13.yaml", folder / "my-scene.yaml")
+    (folder / "config/tiny.yaml").write_text(yaml.safe_dump(TINY))
+    return folder
+
+
+def plan(folder: Path) -> study.Study:
+    """Return the study `tiny` of a project; its scenes are read in the current folder."""
+    return study.load(folder / "config/tiny.yaml", folder / "workflow/schemas/study.schema.yaml")
+
+
+def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
+    """Make all results of the study in a project, with logs and benchmarks of jobs that ended then [s since 1970]."""
+    top = folder / "results/tiny"
+    for result in results.of(planned):
+        for name in (*result.files, result.log, result.benchmark):
+            (top / name).parent.mkdir(parents=True, exist_ok=True)
+        (top / result.log).write_text(f"done at {ended}\n")
+        (top / result.benchmark).write_text(f"s\th:m:s\n12.5\t{ended}\n")
+        os.utime(top / result.benchmark, (ended, ended))
+        first = top / result.files[0]
+        if result.stage == "trajectory":
+            run = planned.runs["fall"]
+            given = scenes.load(folder / run.scene, preset="as_listed")
+            write_dataset(run_dataset(simulate(given, model=run.model, steps=run.steps, every=run.every)), first)
+        elif result.stage == "shard":
+            asked = planned.sweeps["steps"]
+            sweep.compute(asked, asked.shards()[first.stem], first)
+        elif result.stage == "collect":
+            shards = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path, sweep.AT_ONCE))
+            write_dataset(sweep.collect(shards, planned.sweeps["steps"].criteria), first)
+            write_bytes(b"shard,cells\n", top / result.files[1])
+        elif result.stage == "frontier":
+            found = frontier.find(open_file(top / "sweeps/steps/sweep.h5"))
+            write_dataset(found, first)
+            write_bytes(frontier.table(found).encode(), top / result.files[1])
+        elif result.stage == "figure":
+            data = {"as_listed": open_file(top / "runs/fall.as_listed.h5")}
+            figures.draw("position", data, "Position", 60, [str(top / file) for file in result.files])
+        else:
+            told = TABLES["answers"].load()({"steps": open_file(top / "sweeps/steps/frontier.h5")}, "Answers")
+            write_bytes(told.markdown.encode(), first)
+            write_bytes(told.csv.encode(), top / result.files[1])
+    (top / "report.html").write_text(f"<p>made at {ended}</p>")
