@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff peers study report archive bench test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff peers study status report archive bench test test-fast lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -39,6 +39,9 @@ peers: $(READY)  ## the engines that are installed beside stiffdice, into result
 
 study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
+
+status: $(READY)  ## how far a study is, what failed and why: make status STUDY=NAME
+	@$(BIN)/stiffdice status '$(STUDY)' || [ $$? -ne 2 ]
 
 report: study  ## results/NAME/report.html: every figure with its caption, code and configuration: make report STUDY=NAME
 	@$(BIN)/snakemake --cores $(CORES) study --config 'study=$(STUDY)' --report 'results/$(STUDY)/report.html'

@@ -1,4 +1,4 @@
-"""Run Snakemake, then say where the time went: run.py --cores N [what Snakemake takes]..."""
+"""Run Snakemake, then say what failed, or where the time went: run.py --cores N [what Snakemake takes]..."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+
+import ending
 
 STAGES = ("trajectory", "experiment", "timings", "shard", "collect", "frontier", "table", "figure", "animation")
 ROOT = Path(__file__).parent.parent
@@ -65,7 +67,9 @@ def main() -> int:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
     jobs = jobs_since(begun)
-    if jobs and status == 0:
+    if status:
+        print(ending.told(ROOT, begun), flush=True)
+    elif jobs:
         print("\nwhere the time went")
         print(table(jobs, time.time() - begun, options.cores))
     return status

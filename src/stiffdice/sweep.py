@@ -35,8 +35,8 @@ BLOCK = CHUNK_MEMBERS
 
 def compute(
     sweep: Sweep, columns: Sequence[Column], path: str | Path, progress: Callable[[float], None] | None = None
-) -> None:
-    """Compute one shard and store it: each run's measures and verdict, dimensions cell and member.
+) -> int:
+    """Compute one shard, store it (each run's measures and verdict, dimensions cell and member), and return its cells.
 
     What is in memory at a time is a block of members and a scan's passing shares, whatever the size of the sweep.
     progress: called after every round of a scan with about the fraction of the work done.
@@ -47,6 +47,7 @@ def compute(
             _compute_column(sweep, column, spool)
             if progress is not None:
                 progress(float(weight[k] / weight[-1]))
+    return spool.cells
 
 
 def _compute_column(sweep: Sweep, column: Column, spool: Spool) -> None:

@@ -37,7 +37,7 @@ def shards() -> Iterator[xr.Dataset]:
         )
 
 
-with logged(snakemake.log[0]) as say:
+with logged() as say:
     write_dataset(sweep.collect(shards(), snakemake.params.tolerances), snakemake.output.sweep)
     write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)
     say(f"{len(lines) - 1} shards collected")

@@ -10,7 +10,7 @@ from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
-with logged(snakemake.log[0]) as say:
+with logged() as say:
     found = frontier.find(open_file(snakemake.input[0]))
     write_dataset(found, snakemake.output.data)
     write_bytes(frontier.table(found).encode(), snakemake.output.table)

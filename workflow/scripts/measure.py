@@ -14,7 +14,7 @@ snakemake: Any  # Snakemake puts it here
 
 kind = snakemake.rule
 planned = snakemake.params.experiment
-with logged(snakemake.log[0]) as say:
+with logged() as say:
     scene = scenes.load(planned.scene, planned.changes)
     measure = {"experiment": EXPERIMENTS, "timing": TIMINGS}[kind][planned.measure].load()
     watch = Stopwatch()

@@ -4,12 +4,13 @@ from typing import Any
 
 from job import Stopwatch, logged, tenths
 
-from stiffdice import sweep
+from stiffdice import job_log, sweep
 
 snakemake: Any  # Snakemake puts it here
 
-with logged(snakemake.log[0]) as say:
-    watch = Stopwatch()
+with logged() as say:
+    planned, watch = snakemake.params.sweep, Stopwatch()
     with watch.running():
-        sweep.compute(snakemake.params.sweep, snakemake.params.columns, snakemake.output[0], tenths(say))
+        cells = sweep.compute(planned, snakemake.params.columns, snakemake.output[0], tenths(say))
+    say(job_log.cells(cells, planned.members))
     say(f"simulation: {watch.seconds:.3f} s")

@@ -11,7 +11,7 @@ from stiffdice.io.write import write_bytes
 snakemake: Any  # Snakemake puts it here
 
 planned = snakemake.params.table
-with logged(snakemake.log[0]) as say:
+with logged() as say:
     data = {name: open_file(path) for name, path in snakemake.input.items()}
     table = TABLES[planned.draw].load()(data, planned.title)
     write_bytes(table.markdown.encode(), snakemake.output.markdown)

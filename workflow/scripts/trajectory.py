@@ -14,7 +14,7 @@ from stiffdice.simulators import OURS
 snakemake: Any  # Snakemake puts it here
 
 planned, preset = snakemake.params.run, snakemake.wildcards.preset
-with logged(snakemake.log[0]) as say:
+with logged() as say:
     scene = scenes.load(planned.scene, preset=preset)
     watch = Stopwatch()
     with watch.running():

@@ -1,0 +1,287 @@
+"""How far a study is: which of its results are done, which failed and why, and what is left to do.
+
+Told from the files under results/STUDY and from the jobs' logs alone, without opening a result: quick, and safe while
+jobs are at work. Whether a result should be made again because something else has changed is Snakemake's to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from stat import S_ISREG
+from typing import NamedTuple
+
+from stiffdice import disk_use, job_log, results, time_left
+from stiffdice.catalogue import DRAWINGS, TABLES
+from stiffdice.grid import Column, Sweep
+from stiffdice.results import Result
+from stiffdice.study import PlannedFigure, Study
+
+
+class State(StrEnum):
+    """How it stands with one result.
+
+    DONE: its files are there, whole, and so is all that it stands on. RUNNING: its job has begun, and has not ended.
+    INTERRUPTED: its job was told to stop, or ended without a word. FAILED: its job ended by an error. WAITING: its job
+    has not begun.
+    """
+
+    DONE = "done"
+    RUNNING = "running"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"
+    WAITING = "waiting"
+
+
+class Standing(NamedTuple):
+    """One result, and how it stands with it.
+
+    reason: why it failed or was interrupted; of one that runs, what is not known. begun: when its job did (UTC).
+    progress: fraction of a running job that is done, as of `told` (UTC). cells: in a shard that is done, if its log
+    says.
+    """
+
+    result: Result
+    state: State
+    reason: str = ""
+    begun: datetime | None = None
+    progress: float = 0.0
+    told: datetime | None = None
+    cells: int | None = None
+
+
+class Cells(NamedTuple):
+    """The cells of a sweep: counted where the log of a finished shard says how many, else those of the first scans.
+
+    at_least: whether refined scans may have more. done: in shards that are done, and the share of running ones that
+    is. running: the rest of these. failed: in shards that failed or were interrupted. runs: in shards that are done.
+    """
+
+    planned: int
+    at_least: bool
+    done: int
+    running: int
+    failed: int
+    runs: int
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a study is. when: it was looked at (UTC). cells: by sweep. left: of time, for what is not done."""
+
+    study: Study
+    when: datetime
+    standings: tuple[Standing, ...]
+    cells: Mapping[str, Cells]
+    left: time_left.Left
+    use: disk_use.Use
+
+    def those(self, *states: State) -> list[Standing]:
+        """Return the results of which one of these is true."""
+        return [standing for standing in self.standings if standing.state in states]
+
+    @property
+    def state(self) -> State:
+        """The study's: failed if any result is, running if any job is, done if all are."""
+        found = {standing.state for standing in self.standings}
+        for state in (State.FAILED, State.RUNNING, State.INTERRUPTED, State.WAITING):
+            if state in found:
+                return state
+        return State.DONE
+
+    @property
+    def ready(self) -> list[Standing]:
+        """Results whose job has not begun, though all that they stand on is done."""
+        done, below = {standing.result for standing in self.those(State.DONE)}, needs(self.study)
+        return [standing for standing in self.those(State.WAITING) if done.issuperset(below[standing.result])]
+
+    @property
+    def stuck(self) -> list[Standing]:
+        """Results that are not made because something that they stand on failed or was interrupted."""
+        return _stuck(self.standings, needs(self.study))
+
+
+def _stuck(standings: Iterable[Standing], below: Mapping[Result, tuple[Result, ...]]) -> list[Standing]:
+    ended, found = set(), []
+    for standing in standings:  # in the order in which one stands on another
+        if standing.state in (State.FAILED, State.INTERRUPTED):
+            ended.add(standing.result)
+        elif ended.intersection(below[standing.result]):
+            ended.add(standing.result)
+            found.append(standing)
+    return found
+
+
+def of(study: Study, folder: Path, cores: int | None = None) -> Status:
+    """Return how far a study is.
+
+    folder: results/STUDY, there or not. cores: for the time left; by default as many as jobs are running.
+    """
+    below, standings, plans = needs(study), dict[Result, Standing](), _plans(study)
+    for result in results.of(study):
+        standing = _alone(result, folder)
+        if standing.state is State.DONE and any(standings[part].state is not State.DONE for part in below[result]):
+            standing = Standing(result, State.WAITING)  # its files are there, and will be made again
+        standings[result] = standing
+    every = tuple(standings.values())
+    stuck = {standing.result for standing in _stuck(every, below)}
+    return Status(
+        study=study,
+        when=(now := datetime.now(UTC)),
+        standings=every,
+        cells={name: _cells(sweep, plans[name], every) for name, sweep in study.sweeps.items()},
+        left=_left(plans, folder, every, stuck, now, cores),
+        use=disk_use.of(folder, {file for result in standings if result.stage == "shard" for file in result.files}),
+    )
+
+
+def _plans(study: Study) -> dict[str, dict[str, list[Column]]]:
+    """Return the columns of each shard of each sweep, by the names of their results."""
+    return {
+        name: {f"{name}/{shard}": columns for shard, columns in sweep.shards().items()}
+        for name, sweep in study.sweeps.items()
+    }
+
+
+def needs(study: Study) -> dict[Result, tuple[Result, ...]]:
+    """Return for each result of a study those that it is made from."""
+    every = results.of(study)
+    named = {(result.stage, result.name): result for result in every}
+    shards = {name: tuple(named["shard", shard] for shard in plan) for name, plan in _plans(study).items()}
+
+    def needed(result: Result) -> tuple[Result, ...]:
+        match result.stage:
+            case "collect":
+                return shards[result.name]
+            case "frontier":
+                return (named["collect", result.name],)
+            case "figure" | "animation":
+                planned = study.figures[result.name]
+                return tuple(named[key] for key in _shown_by(study, planned, DRAWINGS[planned.draw].given))
+            case "table":
+                planned = study.tables[result.name]
+                return tuple(named[key] for key in _shown_by(study, planned, TABLES[planned.draw].given))
+        return ()
+
+    return {result: needed(result) for result in every}
+
+
+# The stage whose results a figure or a table shows, by what it is given.
+_SHOWN = {"sweeps": "frontier", "experiments": "experiment", "timings": "timings"}
+
+
+def _shown_by(study: Study, planned: PlannedFigure, given: str) -> Iterator[tuple[str, str]]:
+    """Yield the stages and names of what a figure or a table shows."""
+    if planned.run is not None:
+        for preset in study.runs[planned.run].presets:
+            yield "trajectory", f"{planned.run}.{preset}"
+    for name in planned.of:
+        yield _SHOWN[given], name
+    for name in planned.timings:
+        yield "timings", name
+
+
+def _alone(result: Result, folder: Path) -> Standing:
+    """Return how it stands with a result, whatever it stands on."""
+    told = job_log.read(folder / result.log)
+    try:
+        stats = [(folder / file).stat() for file in result.files]
+    except OSError:
+        stats = []
+    for file, stat in zip(result.files, stats, strict=False):
+        if not S_ISREG(stat.st_mode):
+            return Standing(result, State.FAILED, f"{folder / file}: is in the way: not a regular file")
+    if told is None:
+        return Standing(result, State.DONE if stats else State.WAITING)
+    made = bool(stats) and min(stat.st_mtime for stat in stats)
+    return _as_told(result, told, made)
+
+
+def _as_told(result: Result, told: job_log.Told, made: float) -> Standing:
+    """Return how it stands with a result that has a log; made: when the oldest of its files was [s], 0 if not there."""
+    if told.ending == "done" or (made and (told.begun is None or made > told.written.timestamp())):
+        return Standing(result, State.DONE if made else State.WAITING, begun=told.begun, cells=told.cells)
+    if told.ending:
+        return Standing(result, State(told.ending), told.reason, told.begun)
+    if told.begun is None:  # or of a version whose logs did not say
+        empty = "its log is empty; killed at its start, or no room on the disk?"
+        return Standing(result, State.INTERRUPTED, empty) if told.empty else Standing(result, State.WAITING)
+    if not job_log.is_here(told) or job_log.is_alive(told):
+        unseen = "" if job_log.is_here(told) else f"on {told.host}: whether it still runs is not known here"
+        return Standing(result, State.RUNNING, unseen, told.begun, told.progress, told.written)
+    if made >= told.begun.timestamp():
+        return Standing(result, State.DONE, begun=told.begun, cells=told.cells)
+    last = f"{told.written:%Y-%m-%d %H:%M:%S} UTC"
+    return Standing(result, State.INTERRUPTED, f"ended without a word; killed? (its log stops at {last})", told.begun)
+
+
+def _cells(sweep: Sweep, plan: Mapping[str, list[Column]], standings: Iterable[Standing]) -> Cells:
+    sums = {"planned": 0.0, "done": 0.0, "running": 0.0, "failed": 0.0, "runs": 0.0}
+    at_least = False
+    for standing in standings:
+        if standing.result.stage != "shard" or standing.result.name not in plan:
+            continue
+        count = standing.cells or sum(len(sweep.scan(column)) for column in plan[standing.result.name])
+        at_least |= sweep.refine > 0 and standing.cells is None
+        sums["planned"] += count
+        match standing.state:
+            case State.DONE:
+                sums["done"] += count
+                sums["runs"] += count * sweep.members
+            case State.RUNNING:
+                sums["done"] += standing.progress * count
+                sums["running"] += (1 - standing.progress) * count
+            case State.FAILED | State.INTERRUPTED:
+                sums["failed"] += count
+    return Cells(at_least=at_least, **{key: int(value) for key, value in sums.items()})
+
+
+# Stages whose jobs are much alike; of others only what the same job took before is known.
+_ALIKE = ("trajectory", "collect", "frontier", "figure", "table")
+
+
+def _left(
+    plans: Mapping[str, Mapping[str, list[Column]]],
+    folder: Path,
+    standings: Collection[Standing],
+    stuck: Collection[Result],
+    now: datetime,
+    cores: int | None,
+) -> time_left.Left:
+    """Return the time left: of what the run that is under way still makes, or if none is of all that is not done."""
+    running = sum(standing.state is State.RUNNING for standing in standings)
+    columns = {shard: columns for plan in plans.values() for shard, columns in plan.items()}
+    jobs = [_job(standing, columns.get(standing.result.name, []), folder, now) for standing in standings]
+    if running:
+        ended = [part.result in stuck or part.state in (State.FAILED, State.INTERRUPTED) for part in standings]
+        jobs = [job._replace(due=job.due and not over) for job, over in zip(jobs, ended, strict=True)]
+    return time_left.of(jobs, cores or max(1, running))
+
+
+def _job(standing: Standing, columns: list[Column], folder: Path, now: datetime) -> time_left.Job:
+    """Return what is known of a result's job; columns: of a shard."""
+    result = standing.result
+    kind = {"shard": f"shard {result.name.partition('/')[0]}"} | {stage: stage for stage in _ALIKE}
+    job = time_left.Job(
+        kind=kind.get(result.stage, f"{result.stage} {result.name}"),
+        # Of a shard: steps grow with the root of the stiffness.
+        weight=sum(max(column.stiffness, 1.0) ** 0.5 for column in columns) if result.stage == "shard" else 1.0,
+        took=_took(folder / result.benchmark),
+        due=standing.state is not State.DONE,
+        alone=result.stage == "timings",
+    )
+    if standing.state is not State.RUNNING or standing.begun is None or standing.told is None:
+        return job
+    elapsed, told = ((time - standing.begun).total_seconds() for time in (now, standing.told))
+    return job._replace(elapsed=elapsed, progress=standing.progress, told=told)
+
+
+def _took(benchmark: Path) -> float | None:
+    """Return the seconds in one of Snakemake's benchmark files, None if there is none."""
+    try:
+        return float(benchmark.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
+    except (OSError, ValueError, IndexError):
+        return None
