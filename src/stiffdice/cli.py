@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from stiffdice import __version__
-from stiffdice.commands import advise, archive, bench, inspect, run, status
+from stiffdice.commands import advise, archive, bench, diff, inspect, run, status
 from stiffdice.errors import StiffdiceError
 
 EXAMPLES = """\
@@ -18,6 +18,7 @@ examples:
   stiffdice run my-cube.yaml --model auto -o out.h5
   stiffdice advise my-cube.yaml --error 1%
   stiffdice inspect stiff.h5
+  stiffdice diff stiff.h5 out.h5
   stiffdice status paper
   stiffdice archive paper
   stiffdice bench
@@ -40,7 +41,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for command in (run, advise, inspect, status, archive, bench):
+    for command in (run, advise, inspect, diff, status, archive, bench):
         command.add(commands)
     return parser
 
