@@ -6,7 +6,7 @@ They are named by module and function, not imported: reading a study must not wa
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 
@@ -91,3 +91,18 @@ TIMINGS: dict[str, Entry] = {
     "pieces": Entry("stiffdice.experiments.pieces", "time"),
     "engine-speed": Entry("stiffdice.experiments.engine_speed", "time"),
 }
+
+
+def showing_times(plan: object) -> set[str]:
+    """Return which figures and tables of a study, as its file says, show timings: `figures/NAME`, `tables/NAME`."""
+    found = set()
+    for kind, word, registry in (("figures", "draw", DRAWINGS), ("tables", "tell", TABLES)):
+        entries = plan.get(kind) if isinstance(plan, Mapping) else None
+        for name, entry in entries.items() if isinstance(entries, Mapping) else ():
+            if isinstance(entry, Mapping) and (entry.get("timings") or _draws_times(registry, entry.get(word))):
+                found.add(f"{kind}/{name}")
+    return found
+
+
+def _draws_times(registry: Mapping[str, Entry], name: object) -> bool:
+    return isinstance(name, str) and name in registry and registry[name].given == "timings"

@@ -45,7 +45,7 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
         raise InputError(f"{key} = {shown(value)}: allowed is {allowed}")
     if (above is not None and result <= above) or (at_least is not None and result < at_least):
         raise InputError(f"{key} = {shown(value)}: allowed is {allowed}")
-    return result
+    return result + 0.0  # -0 is 0: equal scenes have equal digests
 
 
 def count(key: str, value: object, *, at_least: int = 1, at_most: int = LARGEST_COUNT) -> int:
@@ -80,7 +80,7 @@ def known_keys(where: str, mapping: object, allowed: Collection[str]) -> Mapping
         raise InputError(f"{where or 'the file'} = {shown(mapping)}: allowed are keys: {', '.join(allowed)}")
     for key in mapping:
         if key not in allowed:
-            full = f"{where}.{key}" if where else str(key)
+            full = f"{where}.{shown(key)}" if where else shown(key)
             close = difflib.get_close_matches(str(key), allowed, n=1)
             meant = f"; did you mean {close[0]}?" if close else ""
             raise InputError(f"{full}: unknown key; allowed are {', '.join(allowed)}{meant}")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from stiffdice import __version__
-from stiffdice.commands import advise, archive, bench, diff, inspect, run, status
+from stiffdice.commands import advise, archive, bench, diff, inspect, rebuild, run, status, verify
 from stiffdice.errors import StiffdiceError
 
 EXAMPLES = """\
@@ -21,6 +21,7 @@ examples:
   stiffdice diff stiff.h5 out.h5
   stiffdice status paper
   stiffdice archive paper
+  stiffdice verify results/paper
   stiffdice bench
 """
 
@@ -41,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for command in (run, advise, inspect, diff, status, archive, bench):
+    for command in (run, advise, inspect, diff, status, archive, verify, rebuild, bench):
         command.add(commands)
     return parser
 

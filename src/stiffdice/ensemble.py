@@ -13,7 +13,7 @@ import numpy as np
 
 from stiffdice.errors import InputError
 from stiffdice.scene import Scene
-from stiffdice.state import TOUCHING, TURNING, Array, Ensemble, States, rotated, start_of
+from stiffdice.state import TOUCHING, TURNING, Array, Ensemble, States, along, rotated, start_of
 
 
 def turned(scene: Scene, model: str, count: int) -> States:
@@ -81,7 +81,7 @@ def phased(
     for member, spin, delay in zip(members, spins, late, strict=True):
         if spin.any():
             member["node_offset"] = rotated(member["node_offset"], spin * delay)
-    heights = (members["position"][:, None, :] + members["node_offset"]) @ np.array(scene.ground.normal)
+    heights = along(members["position"][:, None, :] + members["node_offset"], scene.ground.normal)
     if not heights.min() > 0:
         raise InputError(
             f"members = {count}: they are spread over the phase of the first touch-down, so the launch must clear the "

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from typing import Self
 
+LONGEST = 1000  # signs of a message
+
 
 class StiffdiceError(Exception):
-    """An error whose message is written for the person who ran the command: one line, exit status 2."""
+    """An error whose message is written for the person who ran the command: one line, exit status 2.
+
+    What a file says may be in it, so signs that would break the line, or move the terminal, are told by their number.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        told = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in message)
+        super().__init__(told if len(told) <= LONGEST else told[: LONGEST - 3] + "...")
 
 
 class InputError(StiffdiceError):

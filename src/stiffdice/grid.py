@@ -72,7 +72,8 @@ class Sweep:
         if self.steps is None:
             scene = self.scene.with_ground(stiffness=stiffness)
             ends = {end: theory.steps_for(scene, ends[end]) for end in ("from", "to")}
-        return min(ends["from"], ends["to"]), max(ends["from"], ends["to"])
+        first, last = float(ends["from"]), float(ends["to"])  # NumPy has no whole numbers above 2^63
+        return min(first, last), max(first, last)
 
     def scan(self, column: Column) -> list[int]:
         """Return the step counts first tried in a column: spread evenly in their logarithm, jittered within each part.
@@ -139,5 +140,5 @@ def geometric(span: Mapping[str, float]) -> list[float]:
 
     Rounded to twelve digits: 1000, not 999.9999999999998, names a cell.
     """
-    values = np.geomspace(span["from"], span["to"], int(span["count"]))
+    values = np.geomspace(float(span["from"]), float(span["to"]), int(span["count"]))
     return [float(f"{value:.12g}") for value in values]

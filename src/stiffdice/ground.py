@@ -46,4 +46,4 @@ def _unit(normal: checks.Vector, largest: float) -> checks.Vector:
     length = math.sqrt(x * x + y * y + z * z)
     if abs(math.ldexp(length, exponent) - 1) < 4e-16:
         return normal
-    return x / length, y / length, z / length
+    return x / length + 0.0, y / length + 0.0, z / length + 0.0  # as checks.number: no -0

@@ -14,7 +14,7 @@ from stiffdice.io.enums import meanings_of
 
 _LONG = (
     *("title", "Conventions", "history", "source", "references", "scene"),
-    *("scene_digest", "config_digest", "code_digest", "judging_code_digest", "analysis_code_digest"),
+    *("scene_digest", "config_digest", "code_digest", "runs_digest", "judging_code_digest", "analysis_code_digest"),
 )
 
 
@@ -27,7 +27,7 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
     if "scene" in attributes:
         scene = yaml.safe_dump(json.loads(attributes["scene"]), sort_keys=False, default_flow_style=None, width=100)
         lines += ["", "scene", *(f"  {line}" for line in scene.splitlines())]
-    if set(_BOOKED) <= set(dataset.variables):
+    if _has_ledger(dataset):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
     lines += ["", "variables", *_variables(dataset)]
     return "\n".join(lines)
@@ -38,8 +38,12 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
+def _has_verdicts(dataset: xr.Dataset) -> bool:
+    return "verdict" in dataset and "flag_meanings" in dataset.verdict.attrs
+
+
 def _verdicts(dataset: xr.Dataset) -> list[str]:
-    if "verdict" not in dataset:
+    if not _has_verdicts(dataset):
         return ["  none: this file holds no runs"]
     counts = _verdict_counts(dataset)
     total = sum(counts.values())
@@ -57,6 +61,15 @@ SHOWN = 10  # bounces of a ledger
 
 # Of a run's ledger, in this order.
 _BOOKED = ("launch_energy", "damping_work", "drag_work", "friction_work", "scheme_work", "end_energy")
+_OF_BOUNCES = (
+    "bounce_start",
+    *(f"bounce_{part}" for part in ("damping_work", "drag_work", "friction_work", "scheme_work")),
+)
+
+
+def _has_ledger(dataset: xr.Dataset) -> bool:
+    single = all(name in dataset and dataset[name].ndim == 0 for name in (*_BOOKED, "bounce_count"))
+    return single and all(name in dataset and dataset[name].dims == ("bounce",) for name in _OF_BOUNCES)
 
 
 def _ledger(dataset: xr.Dataset) -> list[str]:
@@ -105,7 +118,7 @@ def as_json(dataset: xr.Dataset) -> str:
         "attributes": attributes,
         "sizes": {str(name): size for name, size in dataset.sizes.items()},
         "values": {str(name): _number(variable) for name, variable in dataset.data_vars.items() if variable.ndim == 0},
-        "verdicts": _verdict_counts(dataset) if "verdict" in dataset else {},
+        "verdicts": _verdict_counts(dataset) if _has_verdicts(dataset) else {},
         "variables": {
             str(name): {"dimensions": list(variable.dims), "units": variable.attrs.get("units")}
             for name, variable in dataset.variables.items()

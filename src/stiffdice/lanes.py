@@ -29,7 +29,7 @@ from stiffdice.models.tumbling import Tumbling
 from stiffdice.models.vertical import Vertical
 from stiffdice.scene import Scene
 from stiffdice.simd import bits, load, store, where
-from stiffdice.state import TOUCHING, TURNING, Array, States
+from stiffdice.state import TOUCHING, TURNING, Array, States, along
 
 # Members side by side: enough for the vector units to have always something to do that does not wait for the step
 # before, and not more than registers and the stores behind them hold.
@@ -545,7 +545,7 @@ def numbers_of(scene: Scene, h: float) -> Numbers:
 def flat(scene: Scene, launches: States) -> bool:
     """Return whether all members stand on a face, to round-off."""
     edges = np.einsum("ke,mkx->mex", SIGNS, launches["node_offset"]) / len(SIGNS)
-    levels = np.sort(np.abs(edges @ np.array(scene.ground.normal)), axis=1)
+    levels = np.sort(np.abs(along(edges, scene.ground.normal)), axis=1)
     return bool((levels[:, :2] <= 4 * np.finfo(float).eps * scene.cube.side).all())
 
 

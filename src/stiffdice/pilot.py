@@ -20,7 +20,7 @@ from stiffdice import schemes
 from stiffdice.requirement import least_model
 from stiffdice.scene import Scene
 from stiffdice.simulate import simulate
-from stiffdice.state import Array
+from stiffdice.state import Array, along
 
 # Evenly spread times after the launch at which paths are compared.
 SAMPLES = 600
@@ -157,7 +157,7 @@ def _landings(scene: Scene, places: Array) -> npt.NDArray[np.int64]:
 
     Seen between samples: bounces less than two of them apart count as one.
     """
-    heights = places @ np.array(scene.ground.normal)
+    heights = along(places, scene.ground.normal)
     fall = scene.gravity * max(scene.ground.normal[2], 0.0) * (scene.duration / SAMPLES) ** 2
     lifts = np.diff(heights, 2)
     small = 1e-9 * np.nanmax(np.abs(heights)) if np.isfinite(heights).any() else 0.0

@@ -34,7 +34,7 @@ from stiffdice import checks
 from stiffdice.errors import InputError
 from stiffdice.models import MODELS
 from stiffdice.scene import Scene
-from stiffdice.state import Array, physics_of, start_of
+from stiffdice.state import Array, along, physics_of, start_of
 
 AUTO = "auto"
 AS_ASKED = "as asked"
@@ -147,7 +147,7 @@ def lands_flat(scene: Scene, tolerance: float = ROUND_OFF) -> bool:
 
 def _heights(scene: Scene) -> Array:
     """Return how high above the centre each node is at the launch [m], shape (node,)."""
-    heights: Array = start_of(scene, "tumbling")["node_offset"][0] @ np.array(scene.ground.normal)
+    heights: Array = along(start_of(scene, "tumbling")["node_offset"][0], scene.ground.normal)
     return heights
 
 

@@ -25,7 +25,7 @@ from stiffdice.judge import judge
 from stiffdice.models import MODELS
 from stiffdice.reference import none
 from stiffdice.scene import Scene
-from stiffdice.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
+from stiffdice.state import STATE, Array, Ensemble, Physics, States, along, physics_of, start_of
 from stiffdice.verdict import Verdict
 from stiffdice.watch import SIGHT
 
@@ -383,7 +383,7 @@ def _sunk(physics: Physics, ensemble: States, watched: Watched) -> npt.NDArray[n
     """
     normal = np.array([physics.nx, physics.ny, physics.nz])
     with np.errstate(all="ignore"):  # a run that blew up has infinite heights
-        heights = (ensemble["position"][:, None, :] + ensemble["node_offset"]) @ normal
+        heights = along(ensemble["position"][:, None, :] + ensemble["node_offset"], normal)
         fall = np.sqrt(watched.memory["energy"][:, 2] / (2 * physics.stiffness))
     sag = watched.sight["sag"]
     bounces = (sag < physics.side) & (-heights.min(axis=1) <= 2 * sag + fall)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -123,11 +124,17 @@ class Ensemble(NamedTuple):
     late: Array
 
 
+def along(vectors: Array, direction: Sequence[float] | Array) -> Array:
+    """Return the components of vectors, shape (..., 3), in a direction; BLAS has other digits on other processors."""
+    x, y, z = direction
+    return np.asarray(vectors[..., 0] * x + vectors[..., 1] * y + vectors[..., 2] * z)
+
+
 def rotated(offsets: Array, rotation: Array) -> Array:
     """Return offsets, shape (node, 3), turned by a rotation vector [rad] (Rodrigues' formula, equation 9)."""
     angle = math.hypot(*rotation)
     if angle == 0:
         return offsets.copy()
     axis = rotation / angle
-    along = np.outer(offsets @ axis, axis)
-    return np.asarray(along + np.cos(angle) * (offsets - along) + np.sin(angle) * np.cross(axis, offsets))
+    parallel = np.outer(along(offsets, axis), axis)
+    return np.asarray(parallel + math.cos(angle) * (offsets - parallel) + math.sin(angle) * np.cross(axis, offsets))

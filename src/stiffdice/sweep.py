@@ -17,6 +17,7 @@ from stiffdice.errors import InputError
 from stiffdice.fine import references
 from stiffdice.grid import Column, Sweep
 from stiffdice.io import layout
+from stiffdice.io.digest import cell_digests, digest_of_cells
 from stiffdice.io.spool import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
@@ -187,8 +188,10 @@ def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.
     scene by the same code.
     """
     judged: list[xr.Dataset] = []
+    cells: list[bytes] = []
     for part in parts:
         judged.append(_judged(part, tolerances))
+        cells += cell_digests(part)
         ours, others = judged[-1].attrs, judged[0].attrs
         differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
         if differing:
@@ -199,6 +202,7 @@ def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.
     whole.attrs = judged[0].attrs | {
         "title": "Sweep of stiffness and steps",
         "kind": "sweep",
+        "runs_digest": digest_of_cells(cells),
         "judging_code_digest": code_digest("stiffdice.sweep"),
     }
     return whole

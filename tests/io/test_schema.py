@@ -52,23 +52,14 @@ def run(written):
         (lambda run: run.transpose(), "position has dimensions (axis, time): allowed are (time, axis)"),
         (lambda run: run.assign(step=run.step.astype("i4")), "step is of type i4: allowed is i8"),
         (lambda run: run.assign(position=run.position.assign_attrs(units="cm")), "position has units cm: allowed is m"),
-        (lambda run: run.assign(position=run.position.drop_attrs()), "position has no long_name"),
-        (lambda run: run.assign(verdict=run.verdict + 100), "verdict has values outside of its"),
-        (lambda run: run.assign_coords(time=run.time * np.nan), "time is a coordinate, and not finite everywhere"),
         (lambda run: run.assign_attrs(steps=3000.0), "attribute steps = 3000.0: allowed is a whole number"),
         (lambda run: run.assign_attrs(step_size=np.nan), "attribute step_size = nan: allowed is a number"),
         (lambda run: run.assign_attrs(code_digest=7), "attribute code_digest = 7: allowed is a text"),
-        (lambda run: run.assign_attrs(scene="{}"), "attribute scene is not that of scene_digest"),
-        (lambda run: run.assign_attrs(config="{"), "attribute config is not JSON"),
+        (lambda run: run.assign_attrs(config="{}"), "attribute config is not that of config_digest"),
     ],
 )
 def test_what_is_not_as_asked_is_told(run, change, told):
-    kept = [name for name in run.variables if "flag_meanings" in run[name].attrs]
     changed = change(run)
-    for name in set(kept) & set(changed.variables):  # arithmetic drops attributes
-        changed[name].attrs = run[name].attrs
-    if told.startswith("time"):
-        changed.time.attrs = run.time.attrs
     assert any(line.startswith(told) for line in schema.problems(changed)), schema.problems(changed)
 
 

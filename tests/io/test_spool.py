@@ -11,11 +11,13 @@ import pytest
 import xarray as xr
 
 from stiffdice.errors import InputError, OutputError
+from stiffdice.io.enums import enum_attributes
 from stiffdice.io.read import open_file, parts
 from stiffdice.io.spool import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 
 CELLS, MEMBERS = 40, 150
 ABOUT = {"units": "1", "long_name": "a number"}
+VERDICT = enum_attributes("verdict", list("abcdefghi"))
 
 
 def whole():
@@ -25,7 +27,7 @@ def whole():
     return xr.Dataset(
         {
             "ratio": (table, np.where(rng.random(many) < 0.1, np.nan, rng.random(many)), ABOUT),
-            "verdict": (table, rng.integers(0, 9, many).astype(np.int8), ABOUT | {"flag_meanings": "a b"}),
+            "verdict": (table, rng.integers(0, 9, many).astype(np.int8), VERDICT),
             "decided": ((*table, "criterion"), rng.integers(0, 2**60, (*many, 3)), ABOUT),
         },
         {

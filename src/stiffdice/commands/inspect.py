@@ -28,7 +28,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def _inspect(options: argparse.Namespace) -> None:
     from stiffdice import inspection
+    from stiffdice.io import quarantine
     from stiffdice.io.read import open_file
 
+    quarantine.admit(options.file)
     dataset = open_file(options.file)
     print(inspection.as_json(dataset) if options.json else inspection.as_text(dataset, options.file))

@@ -6,18 +6,19 @@ absolutely; the shards of a sweep cell by cell, however the cells are dealt to t
 
 from __future__ import annotations
 
-import importlib
 import tempfile
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from stiffdice.archive.unzip import unzip
 from stiffdice.diff import folders
 from stiffdice.diff.cells import holds_runs, runs_difference
 from stiffdice.diff.comparison import Comparison
 from stiffdice.diff.files import Difference, bytes_difference, data_difference, first_difference
 from stiffdice.errors import InputError
+from stiffdice.io import quarantine
 from stiffdice.io.read import open_file
 
 __all__ = ["Comparison", "compare"]
@@ -42,10 +43,12 @@ def _unpacked(path: Path, stack: ExitStack) -> Path:
     if not path.exists():
         raise InputError(f"{path}: No such file or directory")
     if path.is_dir() or not _is_zip(path):
+        if path.is_file():
+            quarantine.admit(path)
         return path
-    unzip = importlib.import_module("stiffdice.archive.unzip").unzip
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stiffdice-diff-")))
     unzip(path, folder)
+    quarantine.admit(*sorted(folder.rglob("*.h5")))
     return folder
 
 

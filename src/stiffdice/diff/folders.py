@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from stiffdice import catalogue
 from stiffdice.archive import manifest
@@ -20,8 +19,8 @@ SIDE_FILES = ("report.html", manifest.NAME, "ro-crate-metadata.json", "ro-crate-
 # Where the shards of a sweep are, under the sweep's folder, and what says which of them are in use.
 SHARDS, LISTED = "shards", "shards.csv"
 
-# Where results that show something are, under the study's folder: by the study's key of the same name.
-_SHOWN = {"figures": ("draw", catalogue.DRAWINGS), "tables": ("tell", catalogue.TABLES)}
+# Where results that show something are, under the study's folder.
+_SHOWN = ("figures", "tables")
 
 
 @dataclass(frozen=True)
@@ -76,22 +75,12 @@ def _timed(top: Path, files: Iterable[str]) -> Iterator[str]:
 
 
 def _showing_times(study: Path) -> set[str]:
-    """Return which `figures/NAME` and `tables/NAME` of a study show timings; none if its file cannot be read."""
+    """Return what shows timings, of a study whose file is beside its results; none if that cannot be read."""
     try:
         plan = yaml_file.load(study.parent.parent / "config" / f"{study.name}.yaml")
     except InputError:
         return set()
-    found = set()
-    for kind, (word, registry) in _SHOWN.items():
-        entries = plan.get(kind) if isinstance(plan, Mapping) else None
-        for name, entry in (entries if isinstance(entries, Mapping) else {}).items():
-            if isinstance(entry, Mapping) and (entry.get("timings") or _draws_times(registry, entry.get(word))):
-                found.add(f"{kind}/{name}")
-    return found
-
-
-def _draws_times(registry: Mapping[str, catalogue.Entry], name: Any) -> bool:
-    return isinstance(name, str) and name in registry and registry[name].given == "timings"
+    return catalogue.showing_times(plan)
 
 
 def _unlisted(top: Path, files: Iterable[str]) -> Iterator[str]:

@@ -47,8 +47,12 @@ def runs_digest(parts: Iterable[xr.Dataset]) -> str:
     parts: shards, or some cells of one at a time (`io.read.parts`), dimension cell: in memory is one part, and 32 bytes
     for each cell before it. A cell that is there twice counts twice. Attributes do not count.
     """
-    cells = sorted(digest for part in parts for digest in cell_digests(part))
-    return hashlib.sha256(b"stiffdice runs 1\n" + b"".join(cells)).hexdigest()
+    return digest_of_cells(digest for part in parts for digest in cell_digests(part))
+
+
+def digest_of_cells(cells: Iterable[bytes]) -> str:
+    """Return the one SHA-256 of all cells whose digests these are, in whatever order."""
+    return hashlib.sha256(b"stiffdice runs 1\n" + b"".join(sorted(cells))).hexdigest()
 
 
 def cell_digests(part: xr.Dataset) -> list[bytes]:

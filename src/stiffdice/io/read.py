@@ -2,79 +2,63 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import h5py
 import xarray as xr
 
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io import FORMAT_VERSION, seal
+from stiffdice.io import values
+from stiffdice.io.checked import opened, told
+from stiffdice.io.structure import Contents
 
 
 def open_file(path: str | Path) -> xr.Dataset:
     """Return the dataset in a file of ours, loaded; raises InputError, naming the file, if it cannot be trusted.
 
-    A file from elsewhere is not trusted: links, external storage and virtual datasets are refused, checksums checked.
+    What is not ours is refused before a value is read (`io.structure`), damage by its seal. A file from elsewhere is
+    to be tried in another process before (`io.quarantine`).
     """
-    with _told(path):
-        _inspect(Path(path))
+    with told(path):
+        contents = _contents(path)
+        size, memory = sum(contents.sizes.values()), _memory()
+        if size > memory:
+            raise InputError(f"holds {size / 1e9:.3g} GB: this machine has {memory / 1e9:.3g} GB of memory")
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
-            return dataset.load()
+            return _checked(dataset.load(), contents)
 
 
 def parts(path: str | Path, cells: int) -> Iterator[xr.Dataset]:
     """Yield a file of runs part by part, so many cells at a time, loaded; raises InputError as `open_file` does."""
-    with _told(path):
-        _inspect(Path(path))
+    with told(path):
+        contents = _contents(path)
         dataset = xr.open_dataset(path, engine="h5netcdf", decode_times=False)
     with dataset:
+        if "cell" not in dataset.sizes:
+            raise RefusedError(f"{path}: has no dimension cell; not a file of runs")
         for first in range(0, dataset.sizes["cell"], cells):
-            with _told(path):
-                part = dataset.isel(cell=slice(first, first + cells)).load()
+            with told(path):
+                part = _checked(dataset.isel(cell=slice(first, first + cells)).load(), contents)
             yield part
 
 
-@contextmanager
-def _told(path: str | Path) -> Iterator[None]:
-    """Say in one line, with the file's name, what goes wrong while reading it."""
+def _memory() -> float:
+    """Return how many bytes of memory this machine has; no bound where it does not say."""
     try:
-        yield
-    except InputError as error:
-        raise error.within(str(path)) from None
-    except (OSError, KeyError, ValueError, RuntimeError) as error:
-        if isinstance(error, OSError) and error.strerror:
-            raise InputError(f"{path}: {error.strerror}") from None
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise RefusedError(f"{path}: not a readable HDF5 file ({reason})") from None
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return math.inf
 
 
-# Versions of the format whose files had no seal.
-_UNSEALED = ("1.0", "1.1")
+def _contents(path: str | Path) -> Contents:
+    with opened(path) as (_, contents):
+        return contents
 
 
-def _inspect(path: Path) -> None:
-    sealed = seal.is_sealed(path)
-    if sealed:
-        seal.check(path)
-    with h5py.File(path, "r") as file:
-        version = file.attrs.get("format_version")
-        if not isinstance(version, str):
-            raise RefusedError("has no format_version; not a file of stiffdice")
-        if version.split(".")[0] != FORMAT_VERSION.split(".")[0]:
-            raise RefusedError(f"format_version = {version}: allowed is {FORMAT_VERSION.split('.')[0]}.x")
-        if not sealed and version not in _UNSEALED:
-            raise RefusedError("damaged: has no seal at its end; it is cut short, or was changed by another program")
-        for name, item in _members(file):
-            if not isinstance(item, h5py.Dataset):
-                raise RefusedError(f"{name}: a group; our files have none")
-            if item.is_virtual or item.external:
-                raise RefusedError(f"{name}: keeps its data outside of this file")
-
-
-def _members(file: h5py.File) -> Iterator[tuple[str, object]]:
-    for name in file:
-        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise RefusedError(f"{name}: a link that points elsewhere")
-        yield name, file[name]
+def _checked(dataset: xr.Dataset, contents: Contents) -> xr.Dataset:
+    """Return a loaded dataset; raises RefusedError at what no file of ours holds."""
+    for name, variable in dataset.variables.items():
+        values.check(contents, str(name), variable.values)
+    return dataset

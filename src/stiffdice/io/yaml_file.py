@@ -1,4 +1,4 @@
-"""YAML as people write it: numbers like 1e4 are numbers, a key given twice is an error."""
+"""YAML as people write it: numbers like 1e4 are numbers, a key given twice is an error; and nothing but plain data."""
 
 from __future__ import annotations
 
@@ -11,27 +11,74 @@ import yaml
 
 from stiffdice.errors import InputError
 
-LARGEST_FILE = 1_000_000  # bytes; a scene is under 1 kB, a study under 10 kB
+LARGEST_FILE = 200_000  # bytes; a scene is under 1 kB, a study under 10 kB
+MOST_NODES = 20_000  # numbers, words, lists and mappings, each counted wherever an alias repeats it
+LONGEST_NUMBER = 1000  # digits
+
+_INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML 1.1 without its traps: `1.0e4` read as text, `010` as 8, `1:30` as 90, and repeated keys."""
+    """YAML 1.1 without its traps: `1.0e4` read as text, `010` as 8, `1:30` as 90, and repeated keys.
+
+    Without tags, too: what a value is, it says itself. A date is text, and `<<` a key like any other.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            raise InputError(
+                f"line {event.start_mark.line + 1}: not valid YAML: tag {tag}: allowed are values without tags"
+            )
+        return super().compose_node(parent, index)
+
+    def get_single_node(self) -> yaml.Node | None:
+        node = super().get_single_node()
+        if node is not None:
+            _check_size(node, {}, ())
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen: set[Hashable] = set()
+        seen: set[str] = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
-            if not isinstance(key, Hashable):
-                raise InputError(f"line {key_node.start_mark.line + 1}: a key must be a word")
+            if not isinstance(key, str):
+                raise InputError(f"{_line(key_node)}: a key must be a word; put quotes around a number that is one")
             if key in seen:
-                raise InputError(f"line {key_node.start_mark.line + 1}: key {key} is given twice")
+                raise InputError(f"{_line(key_node)}: key {key} is given twice")
             seen.add(key)
         return super().construct_mapping(node, deep)
 
 
-_INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+def _line(node: yaml.Node) -> str:
+    return f"line {node.start_mark.line + 1}"
+
+
+def _check_size(node: yaml.Node, sizes: dict[int, int], above: tuple[int, ...]) -> int:
+    """Return how many nodes there are in one, aliases followed; raises InputError if too many, or without end.
+
+    A few lines of aliases of aliases stand for more than any memory holds.
+    """
+    if id(node) in above:
+        raise InputError(f"{_line(node)}: not valid YAML: holds itself")
+    if id(node) not in sizes:
+        if isinstance(node, yaml.ScalarNode):
+            if node.tag == _INT and len(node.value) > LONGEST_NUMBER:
+                raise InputError(f"{_line(node)}: a number of {len(node.value)} digits: allowed are {LONGEST_NUMBER}")
+            sizes[id(node)] = 1
+        else:
+            pairs = isinstance(node, yaml.MappingNode)
+            inner = [part for pair in node.value for part in pair] if pairs else node.value
+            sizes[id(node)] = 1 + sum(_check_size(part, sizes, (*above, id(node))) for part in inner)
+    if sizes[id(node)] > MOST_NODES:
+        raise InputError(f"{_line(node)}: more than {MOST_NODES} values; this is no scene or study")
+    return sizes[id(node)]
+
+
+_NOT_READ = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("timestamp", "value", "merge"))
 _Loader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag not in (_INT, _FLOAT)]
+    first: [(tag, pattern) for tag, pattern in resolvers if tag not in (_INT, _FLOAT, *_NOT_READ)]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
 }
 _NUMBER_STARTS = list("-+.0123456789")

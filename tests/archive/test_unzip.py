@@ -1,0 +1,332 @@
+from __future__ import annotations
+
+import os
+import stat
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from stiffdice.archive.unzip import AT_ONCE, Limits, members, unzip
+from stiffdice.errors import InputError, OutputError, RefusedError
+
+CONTENT = {"config/a.yaml": b"question: why?\n" * 40, "results/tiny/b.h5": bytes(range(256)) * 9, "README.md": b""}
+
+
+def entry(name, mode=stat.S_IFREG | 0o644):
+    info = zipfile.ZipInfo(name)
+    info.external_attr = mode << 16
+    return info
+
+
+def packed(path, files=CONTENT, method=zipfile.ZIP_DEFLATED, mode=stat.S_IFREG | 0o644):
+    """A zip file as a careful program writes it."""
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for name, content in files.items():
+            archive.writestr(entry(name, mode), content, method)
+    return path
+
+
+def unpacked(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def untouched(folder):
+    """Whether nothing was left of a refused archive: neither its folder nor a temporary one, nor anything beside."""
+    return {path.name for path in folder.iterdir()} <= {"a.zip"}
+
+
+def refused(path, words):
+    """The one line that refuses it, with nothing left behind."""
+    with pytest.raises(RefusedError, match=words) as caught:
+        unzip(path, path.parent / "out")
+    assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+    assert untouched(path.parent)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_unpacks_what_was_packed(tmp_path, method):
+    told = []
+    unzip(packed(tmp_path / "a.zip", method=method), tmp_path / "out", told.append)
+    assert unpacked(tmp_path / "out") == CONTENT
+    assert told == sorted(told) and 0.9 < told[-1] <= 1
+
+
+def test_unpacks_into_an_empty_folder_and_no_other(tmp_path):
+    path, folder = packed(tmp_path / "a.zip"), tmp_path / "out"
+    folder.mkdir()
+    unzip(path, folder)
+    with pytest.raises(OutputError, match="not empty"):
+        unzip(path, folder)
+    assert unpacked(folder) == CONTENT
+    (tmp_path / "link").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(OutputError, match="not a folder"):
+        unzip(path, tmp_path / "link")
+
+
+def test_unpacks_what_others_pack(tmp_path):
+    """Folders of their own, sizes after the data, 64-bit sizes, a name in UTF-8, and a file that is a program."""
+    path = tmp_path / "a.zip"
+    with path.open("wb") as file, zipfile.ZipFile(_Pipe(file), "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.mkdir("läufe")
+        with archive.open(entry("läufe/run", stat.S_IFREG | 0o4777), "w", force_zip64=True) as member:
+            member.write(b"#!/bin/sh\n" * 9)
+        archive.writestr("small", b"x")
+    unzip(path, tmp_path / "out")
+    assert unpacked(tmp_path / "out") == {"läufe/run": b"#!/bin/sh\n" * 9, "small": b"x"}
+    mode = (tmp_path / "out" / "läufe" / "run").stat().st_mode
+    assert mode & stat.S_IXUSR and not mode & stat.S_ISUID
+
+
+class _Pipe:
+    """A file that cannot be sought in, so that sizes come after the data."""
+
+    def __init__(self, file):
+        self._file = file
+
+    def write(self, data):
+        return self._file.write(data)
+
+    def flush(self):
+        self._file.flush()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("../escaped", "climbs out"),
+        ("a/../../escaped", "climbs out"),
+        ("/etc/escaped", "absolute"),
+        ("C:/escaped", "backslash or a colon"),
+        ("a\\..\\escaped", "backslash or a colon"),
+        ("a//b", "takes? for another"),
+        ("./a", "takes? for another"),
+        ("a/b. ", "takes? for another"),
+        ("a\nb", "not printed"),
+        ("a\x7fb", "not printed"),
+        ("a\N{RIGHT-TO-LEFT OVERRIDE}b", "not printed"),
+        ("x" * 300, "longer than 255"),
+        ("x/" * 600 + "y", "a name of 1201 bytes"),
+    ],
+)
+def test_a_name_that_leads_elsewhere_is_refused(tmp_path, name, words):
+    refused(packed(tmp_path / "a.zip", {"fine": b"1", name: b"2"}), words)
+
+
+def test_a_name_with_a_nul_is_refused(tmp_path):
+    """Python's own writer cuts such a name."""
+    path = packed(tmp_path / "a.zip", {"fine.txt_.sh": b"1"})
+    path.write_bytes(path.read_bytes().replace(b"fine.txt_.sh", b"fine.txt\0.sh"))
+    refused(path, "not printed")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("a", "A"),
+        ("é", "e\u0301"),
+        ("straße", "STRASSE"),
+        ("A/x", "a/y"),
+        ("a", "a/b"),
+        ("a", "A/b"),
+    ],
+)
+def test_two_names_that_some_system_takes_for_one_are_refused(tmp_path, names):
+    refused(packed(tmp_path / "a.zip", dict.fromkeys(names, b"1")), "some systems|file and a folder")
+
+
+def test_a_name_that_is_there_twice_is_refused(tmp_path):
+    path = packed(tmp_path / "a.zip", {"aa": b"1", "ab": b"2"})
+    path.write_bytes(path.read_bytes().replace(b"ab", b"aa"))
+    refused(path, "aa: is there twice")
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [(stat.S_IFLNK, "a link"), (stat.S_IFIFO, "a pipe"), (stat.S_IFCHR, "a device"), (stat.S_IFDIR, "a folder with")],
+)
+def test_what_is_no_file_is_refused(tmp_path, kind, words):
+    refused(packed(tmp_path / "a.zip", {"it": b"/etc/passwd"}, mode=kind | 0o777), f"it: is {words}")
+
+
+@pytest.mark.parametrize(
+    ("method", "words"), [(zipfile.ZIP_BZIP2, "compression 12"), (zipfile.ZIP_LZMA, "compression 14|flags")]
+)
+def test_another_compression_is_refused(tmp_path, method, words):
+    refused(packed(tmp_path / "a.zip", method=method), words)
+
+
+def in_list(path, name, offset, value, form="<H"):
+    """Change a number in the entry that the list of members has of one."""
+    data = bytearray(path.read_bytes())
+    at = data.rindex(name.encode()) - 46
+    assert data[at : at + 4] == b"PK\1\2"
+    struct.pack_into(form, data, at + offset, value)
+    path.write_bytes(data)
+
+
+def in_both(path, name, offset, value, form="<H"):
+    """Change a number in a member's own header, where it is 2 bytes earlier, too."""
+    in_list(path, name, offset, value, form)
+    data = bytearray(path.read_bytes())
+    at = data.index(name.encode()) - 30
+    assert data[at : at + 4] == b"PK\3\4"
+    struct.pack_into(form, data, at + offset - 2, value)
+    path.write_bytes(data)
+
+
+def test_an_encrypted_member_is_refused(tmp_path):
+    path = packed(tmp_path / "a.zip")
+    in_both(path, "config/a.yaml", 8, 1)
+    refused(path, "config/a.yaml: is encrypted")
+
+
+@pytest.mark.parametrize(
+    ("offset", "value", "form"),
+    [(8, 2, "<H"), (10, 0, "<H"), (16, 1, "<L"), (20, 3, "<L"), (24, 601, "<L"), (46, ord("C"), "<B")],
+    ids=["flags", "method", "checksum", "packed", "size", "name"],
+)
+def test_a_list_that_disagrees_with_a_member_is_refused(tmp_path, offset, value, form):
+    path = packed(tmp_path / "a.zip")
+    in_list(path, "config/a.yaml", offset, value, form)
+    refused(path, "otherwise than the member|not compressed|no member")
+
+
+@pytest.mark.parametrize("more", [-1, 1])
+def test_a_member_of_another_size_than_it_says_is_refused(tmp_path, more):
+    path = packed(tmp_path / "a.zip")
+    in_both(path, "config/a.yaml", 24, len(CONTENT["config/a.yaml"]) + more, "<L")
+    refused(path, "config/a.yaml: (holds more than|damaged: 600 bytes instead of 601)")
+
+
+def test_members_that_share_their_bytes_are_refused(tmp_path):
+    """A zip bomb without any nesting: many names for one block of data."""
+    path = packed(tmp_path / "a.zip", {"aa": bytes(900), "bb": bytes(900)})
+    data = path.read_bytes()
+    in_list(path, "bb", 42, data.index(b"PK\3\4"), "<L")
+    refused(path, "overlaps|no member")
+
+
+@pytest.mark.parametrize("where", ["before", "after", "between", "missing"])
+def test_bytes_that_belong_to_nothing_are_refused(tmp_path, where):
+    path = packed(tmp_path / "a.zip")
+    data = path.read_bytes()
+    if where == "between":  # the members and their list, whose place is told right
+        at = data.index(b"PK\1\2")
+        data = bytearray(data[:at] + b"garbage" + data[at:])
+        struct.pack_into("<L", data, len(data) - 6, at + 7)
+    elif where == "missing":  # a comment that is told and not there
+        data = data[:-2] + b"\7\0"
+    else:
+        data = b"garbage" + data if where == "before" else data + b"garbage"
+    path.write_bytes(data)
+    refused(path, "not where it says|after its end|between its members")
+
+
+def test_a_bomb_is_refused_before_anything_is_unpacked(tmp_path):
+    path = packed(tmp_path / "a.zip", {"zeros": bytes(2_000_000)})
+    refused(path, "zeros: 2000000 bytes out of")
+    with pytest.raises(RefusedError, match="more than 1000 bytes"):
+        members(packed(tmp_path / "a.zip"), Limits(size=1000))
+    with pytest.raises(RefusedError, match="3 members; allowed are 2"):
+        members(packed(tmp_path / "a.zip"), Limits(members=2))
+
+
+def test_a_bomb_that_says_little_of_itself_is_stopped_at_what_it_says(tmp_path):
+    path = packed(tmp_path / "a.zip", {"zeros": bytes(50 * AT_ONCE)})
+    in_both(path, "zeros", 24, 1000, "<L")
+    refused(path, "zeros: holds more than the 1000 bytes")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_damage_is_named_and_the_rest_can_be_had(tmp_path, method):
+    """Every byte of a member's data is covered by its checksum."""
+    path = packed(tmp_path / "a.zip", method=method)
+    found = {member.name: member for member in members(path)}["results/tiny/b.h5"]
+    data = bytearray(path.read_bytes())
+    data[found.start + found.packed // 2] ^= 1
+    path.write_bytes(data)
+    refused(path, "results/tiny/b.h5: damaged")
+    damaged: dict[str, str] = {}
+    unzip(path, tmp_path / "out", damaged=damaged)
+    assert list(damaged) == ["results/tiny/b.h5"]
+    rest = {name: content for name, content in CONTENT.items() if name not in damaged}
+    assert unpacked(tmp_path / "out") == rest
+
+
+def test_what_goes_on_after_its_end_is_damaged(tmp_path):
+    """A deflated stream with something after it that no reader would see."""
+    stream = zlib.compressobj(9, zlib.DEFLATED, -15)
+    data = stream.compress(b"seen") + stream.flush() + b"unseen"
+    path = packed(tmp_path / "a.zip", {"it": data}, method=zipfile.ZIP_STORED)
+    for offset, value, form in ((10, 8, "<H"), (16, zlib.crc32(b"seen"), "<L"), (24, 4, "<L")):
+        in_both(path, "it", offset, value, form)
+    refused(path, "it: damaged: its end is not where it says")
+
+
+def test_large_members_come_out_block_by_block(tmp_path):
+    content = np.random.default_rng(1).integers(0, 16, 3 * AT_ONCE + 7, np.uint8).tobytes()
+    unzip(packed(tmp_path / "a.zip", {"large": content}), tmp_path / "out")
+    assert unpacked(tmp_path / "out") == {"large": content}
+
+
+def test_no_room_is_told_before_anything_is_written(tmp_path, monkeypatch):
+    path = packed(tmp_path / "a.zip")
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: type("Usage", (), {"free": 100}))
+    with pytest.raises(OutputError, match="needs 2904 bytes of disk, 100 are free"):
+        unzip(path, tmp_path / "out")
+    assert untouched(tmp_path)
+
+
+def test_interrupted_it_leaves_nothing(tmp_path):
+    def stop(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        unzip(packed(tmp_path / "a.zip"), tmp_path / "out", stop)
+    assert untouched(tmp_path)
+
+
+def test_what_cannot_be_read_is_told(tmp_path):
+    with pytest.raises(InputError, match="No such file"):
+        unzip(tmp_path / "none.zip", tmp_path / "out")
+    with pytest.raises(InputError, match="directory"):
+        unzip(tmp_path, tmp_path / "out")
+
+
+# Of a run by default, and of a long one.
+CASES = int(os.environ.get("STIFFDICE_FUZZ_CASES", "300"))
+NAMES = st.sampled_from(
+    ["a", "a/b", "../a", "/a", "A", "a/", "..", "c:x", "é", "e\u0301", "x\\y", "\N{ZERO WIDTH SPACE}"]
+)
+
+
+@settings(max_examples=CASES, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@given(
+    files=st.dictionaries(NAMES, st.binary(max_size=60), min_size=1, max_size=4),
+    deflated=st.booleans(),
+    changes=st.lists(st.tuples(st.integers(0, 2**16), st.integers(0, 255)), max_size=6),
+    cut=st.integers(0, 3),
+)
+def test_no_change_to_a_zip_file_makes_a_file_elsewhere_or_a_crash(tmp_path_factory, files, deflated, changes, cut):
+    """What comes out, if anything does, is in the folder, as large as it says, and has the checksum it says."""
+    top = tmp_path_factory.mktemp("fuzz")
+    path = packed(top / "a.zip", files, zipfile.ZIP_DEFLATED if deflated else zipfile.ZIP_STORED)
+    data = bytearray(path.read_bytes())
+    for place, value in changes:
+        data[place % len(data)] = value
+    path.write_bytes(data[: len(data) - cut] if cut > 1 else data)
+    try:
+        unzip(path, top / "out")
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert untouched(top)
+        return
+    assert {place.name for place in top.iterdir()} == {"a.zip", "out"}
+    told = {member.name: (member.size, member.checksum) for member in members(path) if not member.is_folder}
+    assert told == {name: (len(content), zlib.crc32(content)) for name, content in unpacked(top / "out").items()}
+    assert not any(place.is_symlink() for place in (top / "out").rglob("*"))

@@ -1,0 +1,279 @@
+"""Every reader with files to spoil: what may come of a spoilt file is an error of one line, or something sound."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.fuzz import hdf5_blocks, mutations
+
+from stiffdice.errors import LONGEST, InputError, RefusedError
+
+TOP = Path(__file__).parent.parent.parent
+SCHEMA = TOP / "workflow" / "schemas" / "study.schema.yaml"
+
+
+class Reader(NamedTuple):
+    """samples: sound files. spoil: sample, others, seed → one that is not. attempt: reads it, in a folder."""
+
+    samples: list[bytes]
+    spoil: Callable[[bytes, list[bytes], int], bytes]
+    attempt: Callable[[bytes, bytes, Path], None]
+
+
+def one_line(error: InputError) -> None:
+    """State that an error is one for people."""
+    assert 0 < len(str(error)) <= LONGEST
+    assert str(error).isprintable(), repr(str(error))
+
+
+def told(error: InputError, path: Path) -> None:
+    """State that an error is one for people, and names the file."""
+    one_line(error)
+    assert str(error).startswith(f"{path}: "), str(error)
+
+
+def scenes() -> Reader:
+    from stiffdice import scene
+
+    def attempt(data: bytes, _: bytes, folder: Path) -> None:
+        path = folder / "scene.yaml"
+        path.write_bytes(data)
+        try:
+            found = scene.load(path)
+        except InputError as error:
+            told(error, path)
+        else:
+            sound_scene(found)
+
+    samples = [path.read_bytes() for path in sorted((TOP / "config" / "scenes").glob("*.yaml"))]
+    return Reader(samples, mutations.text_of, attempt)
+
+
+def sound_scene(found: object) -> None:
+    """State what holds of every scene."""
+    from stiffdice.scene import Scene, from_mapping
+
+    assert isinstance(found, Scene)
+    again = from_mapping(json.loads(json.dumps(found.as_mapping())))
+    assert again == found
+    assert again.digest == found.digest
+    assert found.cube.mass > 0
+    assert found.duration > 0
+    assert all(math.isfinite(part) for part in (*found.launch.spin, *found.launch.velocity, *found.ground.normal))
+    assert math.isclose(math.hypot(*found.ground.normal), 1)
+
+
+def overrides() -> Reader:
+    from stiffdice import scene
+
+    samples = [
+        *(b"ground.stiffness=1e6", b"launch.velocity=[1, 2, 3]", b"launch.angular_momentum={seed: 7, low: 0, high: 1}"),
+        *(b"launch.angular_momentum.seed=7", b"preset=as_written", b"cube={mass: 2, inertia: corners}", b"gravity=0"),
+    ]
+
+    def attempt(data: bytes, _: bytes, __: Path) -> None:
+        try:
+            found = scene.changed({"launch": {"position": [0, 0, 4]}}, [data.decode("utf-8", "surrogateescape")])
+        except InputError as error:
+            one_line(error)
+        else:
+            sound_scene(found)
+
+    return Reader(samples, mutations.text_of, attempt)
+
+
+def studies() -> Reader:
+    from stiffdice import study
+
+    def attempt(data: bytes, _: bytes, folder: Path) -> None:
+        path = folder / "quick.yaml"
+        path.write_bytes(data)
+        try:
+            found = study.load(path, SCHEMA)
+        except InputError as error:
+            one_line(error)
+            assert str(error).startswith(f"{path}: ")
+        else:
+            for sweep in found.sweeps.values():
+                sound_sweep(sweep)
+
+    names = ("quick", "paper", "extremes", "stability", "tradeoff")
+    return Reader([(TOP / "config" / f"{name}.yaml").read_bytes() for name in names], mutations.text_of, attempt)
+
+
+MOST_COLUMNS = 200  # looked at, of a sweep that may have a million
+
+
+def sound_sweep(sweep: object) -> None:
+    """State what holds of every sweep."""
+    from stiffdice.grid import Sweep
+
+    assert isinstance(sweep, Sweep)
+    columns = sweep.columns()
+    assert len(set(columns)) == len(columns) > 0
+    sound_scene(sweep.scene_of(columns[0]))
+    if len(columns) <= MOST_COLUMNS:
+        dealt = [column for part in sweep.shards().values() for column in part]
+        assert sorted(dealt) == sorted(columns)
+    for column in columns[:3]:
+        steps = sweep.scan(column)
+        low, high = sweep.step_range(column.stiffness)
+        assert steps == sorted(set(steps))
+        assert max(1, math.floor(low)) <= steps[0] <= steps[-1] <= math.ceil(high)
+
+
+def manifests() -> Reader:
+    from stiffdice.archive import manifest
+
+    digests = {
+        f"results/quick/{name}": format(number, "064x") for number, name in enumerate(("a.h5", "b/c d.h5", "ü.csv"))
+    }
+
+    def attempt(data: bytes, _: bytes, __: Path) -> None:
+        try:
+            found = manifest.parse(data.decode("utf-8", "replace"))
+        except RefusedError as error:
+            one_line(error)
+        else:
+            assert manifest.parse(manifest.text_of(found)) == found
+
+    return Reader([manifest.text_of(digests).encode(), manifest.text_of({}).encode()], mutations.text_of, attempt)
+
+
+def archives() -> Reader:
+    from stiffdice.archive.unzip import unzip
+
+    image = io.BytesIO()
+    with zipfile.ZipFile(image, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name in ("manifest-sha256.txt", "config/quick.yaml", "results/quick/logs/a b.log"):
+            packed.writestr(name, f"{name}\n" * 50)
+    stored = io.BytesIO()
+    with zipfile.ZipFile(stored, "w") as packed:
+        packed.writestr("a/b.txt", "content")
+
+    def attempt(data: bytes, sample: bytes, folder: Path) -> None:
+        path, target = folder / "x.zip", folder / "x"
+        path.write_bytes(data)
+        try:
+            unzip(path, target)
+        except InputError as error:
+            one_line(error)
+            left = [entry for entry in folder.iterdir() if entry != path]
+            assert left == [], "something half unpacked was left"
+            return
+        for entry in target.rglob("*"):
+            assert not entry.is_symlink()
+        _cleared(target)
+
+    return Reader([image.getvalue(), stored.getvalue()], mutations.bytes_of, attempt)
+
+
+def _cleared(folder: Path) -> None:
+    import shutil
+
+    shutil.rmtree(folder)
+
+
+def _images(folder: Path) -> Iterator[bytes]:
+    """Yield files of ours as HDF5 wrote them: a whole one, and one that grew."""
+    from tests.io.test_structure import whole
+
+    from stiffdice.io import seal
+    from stiffdice.io.spool import Spool
+    from stiffdice.io.write import write_dataset
+
+    write_dataset(whole(), folder / "whole.h5")
+    given = whole().drop_vars("total")
+    with Spool(folder / "grown.h5", given.isel(cell=slice(1))) as spool:
+        first = spool.add_cells(given.sizes["cell"])
+        spool.put({name: given[name].values for name in ("ratio", "verdict", "stiffness")}, slice(first, None))
+    for name in ("whole.h5", "grown.h5"):
+        yield (folder / name).read_bytes()[: -seal.LENGTH]
+
+
+def damaged_files(folder: Path) -> Reader:
+    """Files whose seal was not renewed: read as they were, or not at all."""
+    import xarray as xr
+
+    from stiffdice.io import seal
+    from stiffdice.io.read import open_file
+
+    samples = [image + seal.line_of(image) for image in _images(folder)]
+    sound = {}
+    for sample in samples:
+        (folder / "x.h5").write_bytes(sample)
+        sound[sample] = open_file(folder / "x.h5")
+
+    def attempt(data: bytes, sample: bytes, folder: Path) -> None:
+        path = folder / "x.h5"
+        path.write_bytes(data)
+        try:
+            found = open_file(path)
+        except InputError as error:
+            told(error, path)
+        else:
+            assert data in sound, "a changed file was read"
+            xr.testing.assert_identical(found, sound[data])
+
+    return Reader(samples, mutations.bytes_of, attempt)
+
+
+def forged_files(folder: Path) -> Reader:
+    """Files whose seal was renewed, in another process first: refused there, or all that reads them gets through."""
+    from stiffdice import inspection
+    from stiffdice.io import seal
+    from stiffdice.io.read import open_file, parts
+
+    def attempt(data: bytes, _: bytes, folder: Path) -> None:
+        path = folder / "x.h5"
+        path.write_bytes(data + seal.line_of(data))
+        error = _tried(path)
+        if error is not None:
+            told(error, path)
+            return
+        try:
+            found = open_file(path)
+            for part in parts(path, 50) if "cell" in found.sizes else ():
+                assert set(part.variables) == set(found.variables)
+        except InputError as refusal:
+            told(refusal, path)
+            return
+        for variable in found.variables.values():
+            assert variable.attrs["units"]
+        assert inspection.as_text(found, "x.h5")
+        json.loads(inspection.as_json(found))
+
+    return Reader(list(_images(folder)), hdf5_blocks.changed, attempt)
+
+
+class _Tries:
+    """One child of `quarantine` for all cases of this process."""
+
+    child = None
+
+
+def _tried(path: Path) -> InputError | None:
+    from stiffdice.io.quarantine import Child
+
+    if _Tries.child is None or _Tries.child.is_gone:
+        _Tries.child = Child().__enter__()
+    error = _Tries.child.answer(str(path))
+    assert _Tries.child._process.poll() != 1, "the child itself failed, and not the library"
+    return error
+
+
+READERS = {
+    "scene": lambda _: scenes(),
+    "set": lambda _: overrides(),
+    "study": lambda _: studies(),
+    "manifest": lambda _: manifests(),
+    "zip": lambda _: archives(),
+    "damaged": damaged_files,
+    "forged": forged_files,
+}

@@ -1,0 +1,58 @@
+"""Spoilt files, hundreds of them, and thousands with STIFFDICE_FUZZ=10000 (for each reader): never a crash, a hang, or
+a number that is silently another one.
+
+A case that fails is tried again alone by: python -m tests.fuzz.worker READER SEED 1
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from tests.fuzz.hdf5_blocks import blocks, changed, lookup3
+from tests.fuzz.mutations import bytes_of, text_of
+from tests.fuzz.readers import READERS
+
+TOP = Path(__file__).parent.parent.parent
+CASES = {"scene": 200, "set": 300, "study": 30, "manifest": 300, "zip": 200, "damaged": 100, "forged": 100}
+NEEDS = {"zip": "stiffdice.archive.unzip"}
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_spoilt_file_is_refused_in_one_line_or_sound(reader):
+    if reader in NEEDS and importlib.util.find_spec(NEEDS[reader]) is None:
+        pytest.skip(f"{NEEDS[reader]} is not there")
+    cases = int(os.environ.get("STIFFDICE_FUZZ", CASES[reader]))
+    first = int(os.environ.get("STIFFDICE_FUZZ_FIRST", "0"))
+    command = [sys.executable, "-m", "tests.fuzz.worker", reader, str(first), str(cases)]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, errors="replace", check=False)
+    last = [line for line in done.stderr.splitlines() if line.startswith(f"{reader} ")][-1:]
+    assert done.returncode == 0, f"{done.stdout}\nlast case: {last}, status {done.returncode}\n{done.stderr[-3000:]}"
+    assert last == [f"{reader} {first + cases - 1}"]
+
+
+@pytest.mark.parametrize("spoil", [bytes_of, text_of])
+def test_a_seed_always_makes_the_same_case(spoil):
+    sample, others = b"gravity: 9.8\nground: {stiffness: 1.0e4}\n", [b"duration: 10\n"]
+    cases = [spoil(sample, others, seed) for seed in range(200)]
+    assert cases == [spoil(sample, others, seed) for seed in range(200)]
+    assert len(set(cases)) > 100
+
+
+def test_checksums_are_those_of_the_library():
+    assert lookup3(b"") == 0xDEADBEEF  # as lookup3.c says of nothing from 0
+    assert lookup3(b"Four score and seven years ago") == 0x17770551  # its own example
+
+
+def test_changed_blocks_have_right_checksums(tmp_path):
+    samples = READERS["forged"](tmp_path).samples
+    known = blocks(samples[0])
+    assert len(known) > 15
+    spoilt = [changed(samples[0], samples, seed) for seed in range(30)]
+    assert sum(
+        lookup3(image[a:b]) == int.from_bytes(image[b : b + 4], "little") for image in spoilt for a, b in known
+    ) > (0.7 * len(spoilt) * len(known))
