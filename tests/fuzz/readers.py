@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import math
@@ -174,6 +175,31 @@ def archives() -> Reader:
     return Reader([image.getvalue(), stored.getvalue()], mutations.bytes_of, attempt)
 
 
+def crates() -> Reader:
+    """Descriptions of archives; what is said of files that are not so is a finding of `verify`, not an error."""
+    from stiffdice.archive import manifest
+    from stiffdice.archive.verify import CRATE, verify
+
+    text = b"a,b\n1,2\n"
+    digest = hashlib.sha256(text).hexdigest()
+    files = [{"@id": f"a {k}.csv", "@type": "File", "contentSize": str(len(text)), "sha256": digest} for k in range(3)]
+    graph = [{"@id": CRATE, "about": {"@id": "./"}}, {"@id": "./", "@type": "Dataset", "hasPart": files}, *files]
+    sample = json.dumps({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph}, indent=1).encode()
+
+    def attempt(data: bytes, _: bytes, folder: Path) -> None:
+        crate = folder / "crate"
+        crate.mkdir()
+        contents = {CRATE: data} | {f"a {k}.csv": text for k in range(3)}
+        digests = {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
+        for name, content in (contents | {manifest.NAME: manifest.text_of(digests).encode()}).items():
+            (crate / name).write_bytes(content)
+        for line in verify(crate).lines():
+            assert line.isprintable(), repr(line)
+        _cleared(crate)
+
+    return Reader([sample], mutations.text_of, attempt)
+
+
 def _cleared(folder: Path) -> None:
     import shutil
 
@@ -274,6 +300,7 @@ READERS = {
     "study": lambda _: studies(),
     "manifest": lambda _: manifests(),
     "zip": lambda _: archives(),
+    "crate": lambda _: crates(),
     "damaged": damaged_files,
     "forged": forged_files,
 }
