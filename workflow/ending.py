@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 # The library of this checkout, installed or not.
-sys.path.insert(0, str((Path(__file__).parents[1] / "src").resolve()))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "src"))
 
 from stiffdice import status, status_text, study
 from stiffdice.errors import StiffdiceError

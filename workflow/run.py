@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -10,9 +11,18 @@ import time
 from pathlib import Path
 
 import ending
+import room
 
 STAGES = ("trajectory", "experiment", "timings", "shard", "collect", "frontier", "table", "figure", "animation")
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).resolve().parent.parent
+
+# The library of this checkout, as the jobs have it.
+sys.path.insert(0, str(ROOT / "src"))
+
+from stiffdice.parent import end_with_parent  # noqa: E402
+
+# Of Snakemake, at most: what is made again because it was damaged may show that another result was.
+ROUNDS = 4
 
 
 def seconds_of_job(benchmark: Path) -> float:
@@ -54,6 +64,31 @@ def table(jobs: dict[str, list[tuple[float, float]]], elapsed: float, cores: int
     return "\n".join(lines)
 
 
+def set_aside_since(begun: float) -> dict[str, str]:
+    """Return the results that jobs since `begun` refused and set aside, with the reason of each, as their logs say."""
+    logs = [log for log in sorted(ROOT.glob("results/*/logs/**/*.log")) if log.stat().st_mtime >= begun]
+    found = (re.findall(r"^set aside: (\S+): (.*)$", log.read_text(encoding="utf-8"), re.MULTILINE) for log in logs)
+    return {path: reason for pairs in found for path, reason in pairs}
+
+
+def rounds(command: list[str], environment: dict[str, str]) -> int:
+    """Run Snakemake, and again while jobs set damaged results aside, so that these are made; return its exit status."""
+    made_again: dict[str, str] = {}
+    for _ in range(ROUNDS):
+        begun = time.time()
+        done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=end_with_parent)
+        status = done.returncode
+        damaged = set_aside_since(begun)
+        if status == 0 or not damaged:
+            break
+        made_again |= damaged
+        print(f"\nstiffdice: {len(damaged)} damaged, set aside; Snakemake runs again to make them", flush=True)
+    if status == 0:
+        for path, reason in made_again.items():
+            print(f"made again: {path} was damaged ({reason})")
+    return status
+
+
 def main() -> int:
     """Run Snakemake with its default profile and return its exit status."""
     parser = argparse.ArgumentParser()
@@ -62,10 +97,19 @@ def main() -> int:
     begun = time.time()
     command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), *rest]
     try:
-        status = subprocess.run(command, cwd=ROOT, check=False).returncode
+        changes, told = room.prepare(ROOT, options.cores)
+    except room.RoomError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        return 2
+    for line in told:
+        print(f"stiffdice: {line}", file=sys.stderr)
+    try:
+        status = rounds(command, os.environ | changes)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
+    if status and (reason := room.lack_of(ROOT)):
+        print(f"stiffdice: {reason}", file=sys.stderr)
     jobs = jobs_since(begun)
     if status:
         print(ending.told(ROOT, begun), flush=True)

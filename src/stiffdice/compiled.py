@@ -17,14 +17,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from stiffdice.errors import OutputError
 from stiffdice.provenance import code_digest
+
+_BLOCK = 4096  # bytes: a full disk has not one
 
 
 def _cache_folder() -> Path:
     parts = [code_digest("stiffdice.simulate"), version("numba"), version("numpy"), version("llvmlite")]
     name = "kernels-" + hashlib.sha256(" ".join([*parts, _cpu()]).encode()).hexdigest()[:16]
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    fallback = Path(tempfile.gettempdir()) / f"stiffdice-{os.getuid()}"
+    fallback = _temporary() / f"stiffdice-{os.getuid()}"
     try:
         home = Path(base) if base else Path("~/.cache").expanduser()
     except RuntimeError:  # a user without a home
@@ -34,11 +37,34 @@ def _cache_folder() -> Path:
     for folder in (home / "stiffdice" / name, fallback / name):
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if _has_room(folder) and folder.stat().st_uid == os.getuid():
+                return folder
         except OSError:
             continue
-        if os.access(folder, os.W_OK) and folder.stat().st_uid == os.getuid():
-            return folder
-    return Path(tempfile.mkdtemp(prefix="stiffdice-"))
+    try:
+        return Path(tempfile.mkdtemp(prefix="stiffdice-"))
+    except OSError as error:
+        raise OutputError(
+            f"compiled kernels: neither {home} nor a folder for temporary files can be written ({error.strerror}); "
+            "name one that can be in NUMBA_CACHE_DIR"
+        ) from None
+
+
+def _has_room(folder: Path) -> bool:
+    """Return whether files can be written there: numba does not ask, and fails at the end of compiling."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(_BLOCK))
+    except OSError:
+        return False
+    return True
+
+
+def _temporary() -> Path:
+    try:
+        return Path(tempfile.gettempdir())
+    except OSError:  # there is none that can be written
+        return Path("/tmp")
 
 
 def _cpu() -> str:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from stiffdice import job_log
 
-# What io.write and io.spool call a file that is not finished: .NAME.PROCESS.part
+# What io.write and io.spool call a file that is not finished: .NAME.HOST.PROCESS.part
 _PART = re.compile(r"\..+\.(\d{1,10})\.part")
 
 # The folders of results/STUDY; shards are apart, and what is in none of them is `other`.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import xarray as xr
 from stiffdice import criteria, simulators, theory
 from stiffdice.contact import LAWS
 from stiffdice.ensemble import phased, turned
-from stiffdice.errors import InputError
+from stiffdice.errors import InputError, RefusedError
 from stiffdice.fine import references
 from stiffdice.grid import Column, Sweep
 from stiffdice.io import layout
@@ -178,6 +178,40 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
 
 # Cells of a shard to read at a time while collecting.
 AT_ONCE = 4 * CHUNK_CELLS
+
+
+def checked(parts: Iterable[xr.Dataset], sweep: Sweep, columns: Sequence[Column]) -> Iterator[xr.Dataset]:
+    """Pass a shard on, part by part, if it is the one that `compute` would make of these columns now.
+
+    Raises RefusedError, naming what is other than planned: attributes (code and scene among them), variables, members,
+    columns, or the steps that are scanned first.
+    """
+    pattern = _pattern(sweep)
+    missing = {(list(LAWS).index(column.contact), column.stiffness): set(sweep.scan(column)) for column in columns}
+    for part in parts:
+        _check_like(part, pattern)
+        for contact, stiffness, steps in zip(
+            part.contact.values, part.stiffness.values, part.steps.values, strict=True
+        ):
+            if (contact, stiffness) not in missing:
+                raise RefusedError(f"not the shard planned: has other columns, of stiffness = {stiffness:g}")
+            missing[contact, stiffness].discard(steps)
+        yield part
+    if any(missing.values()):
+        raise RefusedError("not the shard planned: cells are missing")
+
+
+def _check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
+    """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
+    ours, theirs = pattern.attrs, part.attrs
+    if other := [key for key in ours | theirs if str(ours.get(key)) != str(theirs.get(key))]:
+        raise RefusedError(f"not the shard planned: other {', '.join(other)}")
+    for name in pattern.variables.keys() | part.variables.keys():
+        kinds = {(data[name].dims, data[name].dtype) for data in (pattern, part) if name in data.variables}
+        if len(kinds) > 1 or not (name in pattern.variables and name in part.variables):
+            raise RefusedError(f"not the shard planned: other variable {name}")
+    if part.sizes["member"] != pattern.sizes["member"]:
+        raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")
 
 
 def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.Dataset:

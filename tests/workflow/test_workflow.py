@@ -327,25 +327,6 @@ def test_another_study_does_not_mind_a_broken_paper(finished, edited):
 
 
 @pytest.mark.long
-def test_a_damaged_shard_is_named_with_its_remedy(finished, tmp_path):
-    (shard, *_) = sorted((finished.folder / "results/tiny/sweeps/steps/shards").glob("*.h5"))
-    content, stat = shard.read_bytes(), shard.stat()
-    try:
-        shard.write_bytes(content[:1000])
-        done = finished.snakemake("--forcerun", "collect")
-        assert done.returncode != 0
-        assert f"{shard.name}: not a readable HDF5 file" in done.stderr
-        assert "remove the file, and the same command computes it again" in done.stderr
-        shard.unlink()
-        assert finished.snakemake().returncode == 0
-        assert shard.read_bytes() == content
-    finally:
-        shard.write_bytes(content)
-        os.utime(shard, ns=(stat.st_atime_ns, stat.st_mtime_ns))
-        finished.snakemake("--touch")
-
-
-@pytest.mark.long
 def test_the_report_works_without_a_network(finished):
     done = finished.snakemake("--report", "report.html")
     assert done.returncode == 0, done.stderr

@@ -33,7 +33,7 @@ def code_of(script, *modules):
     see the library. The profile turns it off.
     """
     digest = hashlib.sha256(code_digest(*modules).encode())
-    for name in (script, "job.py"):
+    for name in (script, "job.py", "inputs.py"):
         digest.update((Path(workflow.basedir) / "workflow" / "scripts" / name).read_bytes())
     return digest.hexdigest()
 

@@ -33,6 +33,7 @@ rule collect:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared
         tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
         code=code_of("collect.py", "stiffdice.sweep", "stiffdice.io.read", "stiffdice.io.write"),
     log:
@@ -51,7 +52,7 @@ rule collect:
 
 rule frontier:
     input:
-        "results/{study}/sweeps/{sweep}/sweep.h5",
+        sweep="results/{study}/sweeps/{sweep}/sweep.h5",
     output:
         data="results/{study}/sweeps/{sweep}/frontier.h5",
         table=report(

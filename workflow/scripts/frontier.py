@@ -2,16 +2,16 @@
 
 from typing import Any
 
+from inputs import opened
 from job import logged
 
 from stiffdice import frontier
-from stiffdice.io.read import open_file
 from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
 with logged() as say:
-    found = frontier.find(open_file(snakemake.input[0]))
+    found = frontier.find(opened(snakemake.input.items(), say)["sweep"])
     write_dataset(found, snakemake.output.data)
     write_bytes(frontier.table(found).encode(), snakemake.output.table)
     say(f"{found.sizes['stiffness']} stiffnesses, {found.sizes['criterion']} criteria")

@@ -15,10 +15,13 @@ from types import FrameType
 from typing import NoReturn
 
 # The library of this checkout, installed or not: the one whose digest the workflow computed.
-sys.path.insert(0, str((Path(__file__).parents[2] / "src").resolve()))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
 
 from stiffdice import job_log
 from stiffdice.errors import StiffdiceError
+from stiffdice.parent import end_with_parent
+
+end_with_parent()
 
 
 class _Log:

@@ -2,17 +2,17 @@
 
 from typing import Any
 
+from inputs import opened
 from job import logged
 
 from stiffdice.catalogue import TABLES
-from stiffdice.io.read import open_file
 from stiffdice.io.write import write_bytes
 
 snakemake: Any  # Snakemake puts it here
 
 planned = snakemake.params.table
 with logged() as say:
-    data = {name: open_file(path) for name, path in snakemake.input.items()}
+    data = opened(snakemake.input.items(), say)
     table = TABLES[planned.draw].load()(data, planned.title)
     write_bytes(table.markdown.encode(), snakemake.output.markdown)
     write_bytes(table.csv.encode(), snakemake.output.csv)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import stat
 import zipfile
 import zlib
@@ -16,7 +15,7 @@ from stiffdice.archive import contents, crate, manifest, preview
 from stiffdice.archive.citation import Citation
 from stiffdice.archive.sizes import Size, Sizes, sum_of
 from stiffdice.errors import InputError, OutputError
-from stiffdice.io.write import check_target, store
+from stiffdice.io.write import check_target, store, temporary_of
 from stiffdice.study import Study
 
 # What WorkflowHub knows a crate by; zip programs go by the last part of it.
@@ -123,7 +122,7 @@ def _blocks(source: Path | bytes) -> Iterator[bytes]:
 
 
 def _write(target: Path, members: Mapping[str, Member]) -> None:
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    temporary = temporary_of(target)
     try:
         with zipfile.ZipFile(temporary, "w") as archive:
             for name in sorted([*members, *_folders(members)]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -14,7 +15,7 @@ import xarray as xr
 
 from stiffdice.errors import OutputError
 from stiffdice.io import seal
-from stiffdice.io.write import check_target, store
+from stiffdice.io.write import check_target, store, temporary_of
 
 # Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress.
 CHUNK_CELLS, CHUNK_MEMBERS = 16, 64
@@ -29,7 +30,7 @@ class Spool:
 
     def __init__(self, path: str | Path, pattern: xr.Dataset) -> None:
         self._target = check_target(path)
-        self._temporary = self._target.with_name(f".{self._target.name}.{os.getpid()}.part")
+        self._temporary = temporary_of(self._target)
         self._pattern = pattern
         self.cells = 0
 
@@ -37,7 +38,7 @@ class Spool:
         try:
             self._file = h5netcdf.File(self._temporary, "w")
         except OSError as error:
-            raise OutputError(f"{self._target}: {error.strerror}; nothing was stored") from None
+            raise self._told(error) from None
         self._file.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
         self._file.attrs.update(self._pattern.attrs)
         for name, variable in self._pattern.variables.items():
@@ -101,5 +102,8 @@ class Spool:
     def _told(self, error: OSError | RuntimeError) -> OutputError:
         """Return in one line what HDF5 says in many."""
         number = error.errno if isinstance(error, OSError) else None
+        said = re.search(r"errno = ([0-9]+)", str(error))
+        if not number and said:
+            number = int(said[1])
         reason = os.strerror(number) if number else str(error).splitlines()[0]
         return OutputError(f"{self._target}: {reason}; nothing was stored")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +27,36 @@ def check_target(path: str | Path) -> Path:
     return target
 
 
+def temporary_of(target: Path) -> Path:
+    """Return the name under which this process writes a file before it is whole: `.NAME.HOST.PID.part`, beside it.
+
+    Removes what processes of this host that are gone left of the same file; those of other hosts cannot be asked.
+    """
+    host = socket.gethostname()
+    ours = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(host)}\.([0-9]+)\.part")
+    with contextlib.suppress(OSError):  # a folder that cannot be read is told by who writes in it
+        for entry in os.scandir(target.parent):
+            found = ours.fullmatch(entry.name)
+            if found and not _is_alive(int(found[1])):
+                with contextlib.suppress(OSError):
+                    Path(entry).unlink()
+    return target.with_name(f".{target.name}.{host}.{os.getpid()}.part")
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # another user's
+        return True
+    return True
+
+
 def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:
     """Store `data`, and `end` after it, under `path`; raises OutputError, and leaves what was there, if it cannot."""
     target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    temporary = temporary_of(target)
     try:
         with temporary.open("wb") as file:
             file.write(data)
@@ -67,7 +95,10 @@ def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
 
     Compressed (gzip, shuffle) with a checksum on every chunk (fletcher32), and sealed. Equal datasets give equal bytes.
     """
-    image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset)))
+    try:
+        image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset)))
+    except OSError as error:  # in memory, but what makes it may have to be loaded first
+        raise OutputError(f"{path}: {error.strerror or error}; nothing was stored") from None
     write_bytes(image, path, seal.line_of(image))
 
 
