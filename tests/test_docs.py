@@ -33,6 +33,13 @@ PAGES = [
     "docs/peers.md",
     "docs/peers-drake.md",
     "docs/peers-mujoco-pybullet.md",
+    "docs/FORMAT.md",
+    "docs/archive.md",
+    "docs/verify.md",
+    "docs/diff.md",
+    "docs/status.md",
+    "docs/robustness.md",
+    "docs/trust.md",
     "CHANGELOG.md",
 ]
 
