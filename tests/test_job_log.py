@@ -32,7 +32,7 @@ def test_what_is_written_is_read_back(tmp_path):
     [
         (job_log.done(12.34), "done", ""),
         (job_log.failed(InputError("a = 1: allowed is 2")), "failed", "a = 1: allowed is 2"),
-        (job_log.failed(InputError("one\n  and two")), "failed", "one and two"),
+        (job_log.failed(OSError("one\n  and two")), "failed", "a mistake in the program: OSError: one and two"),
         (job_log.failed(MemoryError()), "failed", "not enough memory"),
         (job_log.failed(OSError(24, "Too many open files", "x.h5")), "failed", "x.h5: Too many open files"),
         (job_log.failed(KeyError("k")), "failed", "a mistake in the program: KeyError: 'k'"),

@@ -34,6 +34,7 @@ def test_the_numbers_are_those_that_were_stored():
     with (FORMATS / "numbers.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert {row["file"] for row in rows} == {f"{path.parent.name}/{path.name}" for path in FILES}
+    datasets = {f"{path.parent.name}/{path.name}": open_file(path) for path in FILES}
     for row in rows:
-        values = open_file(FORMATS / row["file"])[row["variable"]].values.ravel()
+        values = datasets[row["file"]][row["variable"]].values.ravel()
         assert values[int(row["index"])].item() == float(row["value"])

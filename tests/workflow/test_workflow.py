@@ -243,8 +243,7 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
     [
         ("figure", {"figure": 4}),
         ("table", {"table": 1}),
-        ("experiment", {"experiment": 2, "figure": 2}),
-        ("timing", {"timing": 1, "figure": 1}),
+        ("measure", {"experiment": 2, "timing": 1, "figure": 2}),
         ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
