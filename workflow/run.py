@@ -85,7 +85,7 @@ def rounds(command: list[str], environment: dict[str, str]) -> int:
         print(f"\nstiffdice: {len(damaged)} damaged, set aside; Snakemake runs again to make them", flush=True)
     if status == 0:
         for path, reason in made_again.items():
-            print(f"made again: {path} was damaged ({reason})")
+            print(f"made again: {path}: {reason}")
     return status
 
 

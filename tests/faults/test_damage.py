@@ -59,7 +59,7 @@ def test_what_was_damaged_is_named_and_made_again(undisturbed, tmp_path):
     lines = [line for line in done.stdout.splitlines() if line.startswith("made again")]
     assert len(lines) == len(told)
     for path, reason in told.items():
-        assert any(line.startswith(f"made again: {name_of(project, path)} was damaged ({reason}") for line in lines)
+        assert any(line.startswith(f"made again: {name_of(project, path)}: {reason}") for line in lines)
     assert "Traceback" not in done.stdout + done.stderr
     is_as_undisturbed(project, undisturbed, *(path.relative_to(project.results).as_posix() for path in told))
 
@@ -72,7 +72,7 @@ def test_what_is_made_of_shards_is_made_again_too(undisturbed, tmp_path):
     shutil.copy(project.results / "runs/stiff.as_listed.h5", folder / "frontier.h5")
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "made again: results/small/sweeps/steps/sweep.h5 was damaged (damaged: its content" in done.stdout
+    assert "made again: results/small/sweeps/steps/sweep.h5: damaged: its content" in done.stdout
     is_as_undisturbed(project, undisturbed, "sweeps/steps/sweep.h5")
 
 
@@ -103,7 +103,7 @@ def test_a_shard_of_other_code_does_not_pass_for_ours_when_snakemake_forgot(undi
     (project.results / "sweeps/steps/sweep.h5").unlink()
     done = project.run()
     assert done.returncode == 0, done.stdout + done.stderr
-    told = f"made again: {name_of(project, shard)} was damaged (not the shard planned: other code_digest)"
+    told = f"made again: {name_of(project, shard)}: not the shard planned: other code_digest"
     assert told in done.stdout
     is_as_undisturbed(project, undisturbed, f"sweeps/steps/shards/{shard.name}")
 

@@ -348,7 +348,7 @@ class _Files:
         if version not in _BEFORE_SANITY:
             problems += sanity.problems(dataset)
         else:
-            self._report.note(f"whether the numbers of {name} can be, as it is of format {version}")
+            self._report.note(f"whether the numbers in files of format {version} can be")
         self._report.fail(name, *(where + problem for problem in problems))
 
 
