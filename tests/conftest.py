@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import NamedTuple
@@ -73,6 +74,18 @@ def plan(study_schema):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         return study.load("config/quick.yaml", study_schema).sweeps["steps-needed"]
+
+
+@pytest.fixture(scope="session")
+def small(plan):
+    """A sweep of six columns that takes no time."""
+    return dataclasses.replace(
+        plan,
+        stiffness={"from": 1e2, "to": 1e3, "count": 3},
+        omega_h={"from": 2.0, "to": 0.5, "count": 5},
+        members=3,
+        refine=0,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -314,18 +314,6 @@ def test_text_of_files_does_not_command_a_terminal(pair):
     assert "\x1b" not in str(caught.value)
 
 
-@pytest.fixture(scope="module")
-def small(plan):
-    """A sweep of six columns that takes no time."""
-    return dataclasses.replace(
-        plan,
-        stiffness={"from": 1e2, "to": 1e3, "count": 3},
-        omega_h={"from": 2.0, "to": 0.5, "count": 5},
-        members=3,
-        refine=0,
-    )
-
-
 def compute(plan, folder):
     """Compute a sweep as the workflow does, into the folder of a study."""
     (folder / "shards").mkdir(parents=True)

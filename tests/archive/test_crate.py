@@ -35,16 +35,6 @@ NO_ADDRESS = "SHOULD be an absolute URI"
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    folder = packing.project(tmp_path_factory.mktemp("finished"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        planned = packing.plan(folder)
-        packing.make(planned, folder)
-    return folder, planned
-
-
-@pytest.fixture(scope="module")
 def archive(finished, tmp_path_factory):
     return pack(finished[1], finished[0], tmp_path_factory.mktemp("packed") / "tiny.crate.zip").path
 

@@ -29,17 +29,6 @@ TELLS_TIMES = re.compile(
 )
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """A project whose study is done, and the study; nobody changes it."""
-    folder = packing.project(tmp_path_factory.mktemp("finished"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        planned = packing.plan(folder)
-        packing.make(planned, folder)
-    return folder, planned
-
-
 @pytest.fixture
 def own(finished, tmp_path):
     """A copy of that project for one test to spoil."""

@@ -139,18 +139,6 @@ def test_text_has_a_digest_and_what_no_file_of_ours_holds_is_refused():
 
 
 @pytest.fixture(scope="module")
-def small(plan):
-    """A sweep of six columns that takes no time."""
-    return dataclasses.replace(
-        plan,
-        stiffness={"from": 1e2, "to": 1e3, "count": 3},
-        omega_h={"from": 2.0, "to": 0.5, "count": 5},
-        members=3,
-        refine=0,
-    )
-
-
-@pytest.fixture(scope="module")
 def dealt(small, tmp_path_factory):
     """Its shards, one column in each, and four; by columns in each."""
     found = {}

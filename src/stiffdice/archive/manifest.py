@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping
+from pathlib import Path
 
 from stiffdice.errors import RefusedError
 
@@ -11,6 +13,12 @@ from stiffdice.errors import RefusedError
 NAME = "manifest-sha256.txt"
 
 _LINE = re.compile(r"([0-9a-f]{64})  ([^\n\r]+)")
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal digits; raises OSError if it cannot be read."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def text_of(digests: Mapping[str, str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import stat
 import zipfile
@@ -14,8 +13,8 @@ from typing import NamedTuple
 from stiffdice.archive import contents, crate, manifest, preview
 from stiffdice.archive.citation import Citation
 from stiffdice.archive.sizes import Size, Sizes, sum_of
-from stiffdice.errors import InputError, OutputError
-from stiffdice.io.write import check_target, store, temporary_of
+from stiffdice.errors import InputError
+from stiffdice.io.write import check_target, whole
 from stiffdice.study import Study
 
 # What WorkflowHub knows a crate by; zip programs go by the last part of it.
@@ -122,20 +121,12 @@ def _blocks(source: Path | bytes) -> Iterator[bytes]:
 
 
 def _write(target: Path, members: Mapping[str, Member]) -> None:
-    temporary = temporary_of(target)
-    try:
-        with zipfile.ZipFile(temporary, "w") as archive:
-            for name in sorted([*members, *_folders(members)]):
-                if name.endswith("/"):
-                    archive.writestr(_info(name, stat.S_IFDIR | 0o755), b"")
-                else:
-                    _add(archive, name, members[name])
-        store(temporary, target)
-    except OSError as error:
-        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    with whole(target) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for name in sorted([*members, *_folders(members)]):
+            if name.endswith("/"):
+                archive.writestr(_info(name, stat.S_IFDIR | 0o755), b"")
+            else:
+                _add(archive, name, members[name])
 
 
 def _folders(names: Iterable[str]) -> set[str]:

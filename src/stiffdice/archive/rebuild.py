@@ -5,7 +5,6 @@ This executes code of the archive: its Snakefile, its scripts, its library. `ver
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import shutil
@@ -24,7 +23,7 @@ from stiffdice import catalogue
 from stiffdice import study as studies
 from stiffdice.archive import manifest
 from stiffdice.archive.report import shown
-from stiffdice.archive.unzip import AT_ONCE, unzip
+from stiffdice.archive.unzip import unzip
 from stiffdice.archive.verify import verify
 from stiffdice.diff import compare
 from stiffdice.errors import InputError, RefusedError, StiffdiceError
@@ -252,7 +251,7 @@ def _compare(rebuilt: Rebuilt, place: Path, results: Mapping[str, str]) -> None:
             rebuilt.left_out.append(name)
         elif not new.is_file():
             rebuilt.different[name] = ["was not made"]
-        elif _digest(new) == digest:
+        elif manifest.digest_of(new) == digest:
             rebuilt.same.append(name)
         else:
             lines = _told_apart(place / ARCHIVED / name.removeprefix("results/"), new)
@@ -271,11 +270,3 @@ def _told_apart(old: Path, new: Path) -> list[str]:
     except InputError as error:
         return [str(error)]
     return [] if comparison.same else list(comparison.lines())
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(AT_ONCE):
-            digest.update(block)
-    return digest.hexdigest()

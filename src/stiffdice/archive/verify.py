@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import json
 import os
 import re
@@ -19,7 +18,7 @@ import xarray as xr
 from stiffdice import sanity, sweep
 from stiffdice.archive import manifest
 from stiffdice.archive.report import Report
-from stiffdice.archive.unzip import AT_ONCE, unzip
+from stiffdice.archive.unzip import unzip
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import quarantine, schema
 from stiffdice.io.enums import meanings_of
@@ -97,7 +96,7 @@ class _Folder:
             tell = self._teller(self._files, 0, 0.5)
             digests = {}
             for name, path in self._files.items():
-                digests[name] = _digest(path)
+                digests[name] = manifest.digest_of(path)
                 tell(name)
             self._check_manifest(digests)
             self._check_crate(digests)
@@ -212,14 +211,6 @@ class _Folder:
 def _is_left_behind(name: str) -> bool:
     """Return whether an interrupted command left a file: it has no name of its own yet."""
     return name.startswith(".") and name.endswith(".part")
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(AT_ONCE):
-            digest.update(block)
-    return digest.hexdigest()
 
 
 class _Files:

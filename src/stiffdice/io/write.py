@@ -6,6 +6,7 @@ import contextlib
 import os
 import re
 import socket
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -53,20 +54,28 @@ def _is_alive(process: int) -> bool:
     return True
 
 
-def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:
-    """Store `data`, and `end` after it, under `path`; raises OutputError, and leaves what was there, if it cannot."""
-    target = Path(path)
+@contextlib.contextmanager
+def whole(target: Path) -> Iterator[Path]:
+    """Give the path under which the block writes a file, which has its name once the block ends.
+
+    Raises OutputError, and leaves what was there before, if it cannot be stored.
+    """
     temporary = temporary_of(target)
     try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.write(end)
+        yield temporary
         store(temporary, target)
     except OSError as error:
         raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:
+    """Store `data`, and `end` after it, under `path`; raises OutputError, and leaves what was there, if it cannot."""
+    with whole(Path(path)) as temporary, temporary.open("wb") as file:
+        file.write(data)
+        file.write(end)
 
 
 def store(temporary: Path, target: Path) -> None:
