@@ -95,7 +95,10 @@ def main() -> int:
     parser.add_argument("--cores", type=int, required=True)
     options, rest = parser.parse_known_args()
     begun = time.time()
-    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), *rest]
+    # By its name, as links to it (profiles/) are not in an archive.
+    named = any(part.startswith("--workflow-profile") for part in rest)
+    profile = [] if named else ["--workflow-profile", "workflow/profiles/default"]
+    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), *profile, *rest]
     try:
         changes, told = room.prepare(ROOT, options.cores)
     except room.RoomError as error:

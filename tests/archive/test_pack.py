@@ -23,6 +23,8 @@ from stiffdice.cli import main
 from stiffdice.errors import InputError, OutputError, RefusedError
 from stiffdice.io.read import open_file
 
+FORMATS = packing.ROOT / "tests" / "reference" / "formats"
+
 # What may differ between two rebuilds: what was said and measured while jobs ran, and what tells of it.
 TELLS_TIMES = re.compile(
     r"results/tiny/(logs/.*|benchmarks/.*|report\.html)|ro-crate-(metadata\.json|preview\.html)|manifest-sha256\.txt"
@@ -138,6 +140,15 @@ def test_a_missing_result_is_told(own, tmp_path):
     with pytest.raises(InputError, match=r"^results/tiny/figures/position\.svg: not there, as 2 of 11 .*STUDY=tiny"):
         pack(planned, folder, tmp_path / "a.zip")
     assert not (tmp_path / "a.zip").exists()
+
+
+def test_a_result_of_an_earlier_format_is_told_and_not_packed(own, tmp_path):
+    folder, planned = own
+    (run,) = (folder / "results" / "tiny" / "runs").glob("*.as_listed.h5")
+    shutil.copy(FORMATS / "1.1" / "run.h5", run)
+    with pytest.raises(InputError, match=rf"{run.name}: of format 1.1, made by earlier code"):
+        pack(planned, folder, tmp_path / "x.zip")
+    assert not (tmp_path / "x.zip").exists()
 
 
 def test_a_damaged_result_is_told_and_not_packed(own, tmp_path):

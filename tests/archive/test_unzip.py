@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from stiffdice.archive.unzip import AT_ONCE, Limits, members, unzip
+from stiffdice.archive.unzip import AT_ONCE, unzip
+from stiffdice.archive.zip_list import Limits, members
 from stiffdice.errors import InputError, OutputError, RefusedError
 
 CONTENT = {"config/a.yaml": b"question: why?\n" * 40, "results/tiny/b.h5": bytes(range(256)) * 9, "README.md": b""}

@@ -11,8 +11,8 @@ import pytest
 
 from stiffdice import frontier, sweep
 from stiffdice.archive import manifest
-from stiffdice.archive.unzip import members
 from stiffdice.archive.verify import CRATE, verify
+from stiffdice.archive.zip_list import members
 from stiffdice.cli import main
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io.layout import run_dataset

@@ -37,6 +37,7 @@ def is_as_undisturbed(project, undisturbed, *aside):
     assert {name: content for name, content in found.items() if not name.endswith(".damaged")} == undisturbed.data()
 
 
+@pytest.mark.long
 def test_what_was_damaged_is_named_and_made_again(undisturbed, tmp_path):
     """All shards, each in its own way, and an experiment, in one go."""
     project = undisturbed.copy(tmp_path / "project")

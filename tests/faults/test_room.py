@@ -65,6 +65,7 @@ cp -a results/. whole
 
 @mounted
 @pytest.mark.workflow
+@pytest.mark.long
 @pytest.mark.parametrize("room", [64, 8])  # KiB: the disk is full when a job stores its result; or at once
 def test_a_full_disk_is_told_and_the_same_command_goes_on(undisturbed, tmp_path, room):
     project, shard = with_a_shard_missing(undisturbed, tmp_path / "project")
@@ -102,6 +103,7 @@ FULL = "mkdir -p {0}; mount -t tmpfs -o size=16k none {0}; (head -c 64k /dev/zer
 
 @mounted
 @pytest.mark.workflow
+@pytest.mark.long
 @pytest.mark.skipif(
     any(str(Path(place).resolve()).startswith("/tmp/") for place in (sys.prefix, sys.base_prefix)),
     reason="Python itself is in /tmp",

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from stiffdice import results
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io import yaml_file
+from stiffdice.io import FORMAT_VERSION, yaml_file
 from stiffdice.io.read import open_file
 from stiffdice.study import Study
 
@@ -97,7 +97,10 @@ def scenes_of(study: str, root: Path) -> list[str]:
 
 
 def read(files: list[File]) -> Found:
-    """Read every HDF5 file and return what the data say; raises RefusedError naming the first that is not whole."""
+    """Read every HDF5 file and return what the data say.
+
+    Raises RefusedError naming the first that is not whole, InputError naming one of an earlier format.
+    """
     runs: dict[str, int] = {}
     software: set[tuple[str, str]] = set()
     for file in files:
@@ -108,6 +111,9 @@ def read(files: list[File]) -> Found:
         if file.source.suffix != ".h5":
             continue
         dataset = open_file(file.source)
+        version = dataset.attrs["format_version"]
+        if version != FORMAT_VERSION:
+            raise InputError(f"{file.path}: of format {version}, made by earlier code; run the study again first")
         if file.result.stage == "shard":
             runs[file.path] = dataset.sizes["cell"] * dataset.sizes["member"]
         software.update(_software(dataset.attrs))
