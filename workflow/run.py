@@ -71,12 +71,17 @@ def set_aside_since(begun: float) -> dict[str, str]:
     return {path: reason for pairs in found for path, reason in pairs}
 
 
+def tied() -> None:
+    """Have Snakemake end with this process."""
+    end_with_parent("run.py")
+
+
 def rounds(command: list[str], environment: dict[str, str]) -> int:
     """Run Snakemake, and again while jobs set damaged results aside, so that these are made; return its exit status."""
     made_again: dict[str, str] = {}
     for _ in range(ROUNDS):
         begun = time.time()
-        done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=end_with_parent)
+        done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=tied)
         status = done.returncode
         damaged = set_aside_since(begun)
         if status == 0 or not damaged:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
 import sys
+from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1  # of linux/prctl.h
+_INIT = 1  # the process that inherits others
 
 
-def end_with_parent() -> None:
+def end_with_parent(name: str) -> None:
     """Have the kernel kill this process when its parent is gone, however that ended; on Linux only.
 
     What goes on alone would still write: the results of an old plan over those of a new one, if that was changed since.
+    name: in the parent's command line, by which it is told from the one that inherits orphans, should it be gone
+    already.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() == _INIT and name not in _command_of(_INIT):
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _command_of(process: int) -> str:
+    return Path(f"/proc/{process}/cmdline").read_text(encoding="utf-8", errors="replace")

@@ -246,9 +246,12 @@ def test_only_what_the_dead_of_this_host_left_is_removed(tmp_path):
     assert sorted(entry.name for entry in tmp_path.iterdir()) == sorted([*names[2:], "x.h5"])
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no way to ask for it")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="other systems have no way to ask for it")
+
+
+@linux
 def test_a_process_ends_with_its_parent():
-    child = "from stiffdice.parent import end_with_parent; end_with_parent(); print(1, flush=True); input()"
+    child = "from stiffdice.parent import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
     started = subprocess.Popen([sys.executable, "-c", parent], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert started.stdout.readline() == b"1\n"
@@ -258,3 +261,24 @@ def test_a_process_ends_with_its_parent():
     assert psutil.wait_procs(children, timeout=60)[1] == []
     started.stdin.close()
     started.stdout.close()
+
+
+@linux
+def test_a_process_whose_parent_is_gone_already_does_not_begin(tmp_path):
+    child = (
+        "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.parent import end_with_parent\n"
+        "while os.getppid() == int(sys.argv[1]): time.sleep(0.01)\n"
+        "Path('told').write_text(f'{os.getpid()} {os.getppid()} \\n')\n"
+        "end_with_parent('no such program')\nPath('begun').touch()"
+    )
+    parent = f"import os, subprocess, sys; subprocess.Popen([sys.executable, '-c', {child!r}, str(os.getpid())])"
+    subprocess.run([sys.executable, "-c", parent], cwd=tmp_path, check=True)
+    told = tmp_path / "told"
+    while not (told.exists() and told.read_text().endswith("\n")):
+        time.sleep(0.05)
+    process, heir = map(int, told.read_text().split())
+    if heir != 1:
+        pytest.skip("orphans are inherited by another than process 1 here")
+    while psutil.pid_exists(process):
+        time.sleep(0.05)
+    assert not (tmp_path / "begun").exists()

@@ -21,7 +21,7 @@ from stiffdice import job_log
 from stiffdice.errors import StiffdiceError
 from stiffdice.parent import end_with_parent
 
-end_with_parent()
+end_with_parent("snakemake")
 
 
 class _Log:
