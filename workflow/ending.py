@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
-
-# The library of this checkout, installed or not.
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "src"))
 
 from stiffdice import status, status_text, study
 from stiffdice.errors import StiffdiceError

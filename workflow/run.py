@@ -10,7 +10,6 @@ import sys
 import time
 from pathlib import Path
 
-import ending
 import room
 
 STAGES = ("trajectory", "experiment", "timings", "shard", "collect", "frontier", "table", "figure", "animation")
@@ -20,14 +19,10 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "src"))
 
 from stiffdice.parent import end_with_parent  # noqa: E402
+from stiffdice.time_left import took  # noqa: E402
 
 # Of Snakemake, at most: what is made again because it was damaged may show that another result was.
 ROUNDS = 4
-
-
-def seconds_of_job(benchmark: Path) -> float:
-    """Return the wall-clock seconds in one of Snakemake's benchmark files."""
-    return float(benchmark.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
 
 
 def seconds_of_simulation(log: Path) -> float:
@@ -45,7 +40,9 @@ def jobs_since(begun: float) -> dict[str, list[tuple[float, float]]]:
         relative = benchmark.relative_to(ROOT / "results")
         log = ROOT / "results" / relative.parts[0] / "logs" / Path(*relative.parts[2:]).with_suffix(".log")
         stage = relative.with_suffix("").parts[2]
-        jobs.setdefault(stage, []).append((seconds_of_job(benchmark), seconds_of_simulation(log)))
+        seconds = took(benchmark)
+        if seconds is not None:
+            jobs.setdefault(stage, []).append((seconds, seconds_of_simulation(log)))
     return jobs
 
 
@@ -120,6 +117,8 @@ def main() -> int:
         print(f"stiffdice: {reason}", file=sys.stderr)
     jobs = jobs_since(begun)
     if status:
+        import ending  # takes half a second, as it reads studies
+
         print(ending.told(ROOT, begun), flush=True)
     elif jobs:
         print("\nwhere the time went")

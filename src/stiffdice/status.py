@@ -269,7 +269,7 @@ def _job(standing: Standing, columns: list[Column], folder: Path, now: datetime)
         kind=kind.get(result.stage, f"{result.stage} {result.name}"),
         # Of a shard: steps grow with the root of the stiffness.
         weight=sum(max(column.stiffness, 1.0) ** 0.5 for column in columns) if result.stage == "shard" else 1.0,
-        took=_took(folder / result.benchmark),
+        took=time_left.took(folder / result.benchmark),
         due=standing.state is not State.DONE,
         alone=result.stage == "timings",
     )
@@ -277,11 +277,3 @@ def _job(standing: Standing, columns: list[Column], folder: Path, now: datetime)
         return job
     elapsed, told = ((time - standing.begun).total_seconds() for time in (now, standing.told))
     return job._replace(elapsed=elapsed, progress=standing.progress, told=told)
-
-
-def _took(benchmark: Path) -> float | None:
-    """Return the seconds in one of Snakemake's benchmark files, None if there is none."""
-    try:
-        return float(benchmark.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
-    except (OSError, ValueError, IndexError):
-        return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
@@ -69,3 +70,11 @@ def _remaining(job: Job, rates: dict[str, float]) -> float | None:
     if whole is None or job.elapsed is None:
         return whole
     return whole - job.elapsed if whole > job.elapsed else None
+
+
+def took(benchmark: Path) -> float | None:
+    """Return the seconds in one of Snakemake's benchmark files, None if there is none that is whole."""
+    try:
+        return float(benchmark.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
+    except (OSError, ValueError, IndexError):
+        return None
