@@ -129,6 +129,11 @@ def telling_code(planned):
     return code_of("table.py", TABLES[planned.draw].module, "stiffdice.io.read", "stiffdice.io.write")
 
 
+def growing(amount):
+    """Return a resource that a job gets twice as much of with every further attempt."""
+    return lambda wildcards, attempt: amount * 2 ** (attempt - 1)
+
+
 @cache
 def tell_left_out(name):
     for line in study(name).left_out:

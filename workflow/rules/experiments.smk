@@ -15,8 +15,8 @@ rule experiment:
         "results/{study}/benchmarks/experiment/{experiment}.tsv"
     priority: 20
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=growing(1000),
+        runtime=growing(30),
     conda:
         "../envs/stiffdice.yaml"
     script:
@@ -38,8 +38,8 @@ rule timing:
         "results/{study}/benchmarks/timings/{timing}.tsv"
     threads: workflow.cores
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=growing(1000),
+        runtime=growing(30),
     conda:
         "../envs/stiffdice.yaml"
     script:

@@ -21,8 +21,8 @@ rule figure:
     benchmark:
         "results/{study}/benchmarks/figure/{figure}.tsv"
     resources:
-        mem_mb=700,
-        runtime=5,
+        mem_mb=growing(700),
+        runtime=growing(5),
     conda:
         "../envs/stiffdice.yaml"
     script:
@@ -66,8 +66,8 @@ rule table:
     benchmark:
         "results/{study}/benchmarks/table/{table}.tsv"
     resources:
-        mem_mb=700,
-        runtime=5,
+        mem_mb=growing(700),
+        runtime=growing(5),
     conda:
         "../envs/stiffdice.yaml"
     script:

@@ -20,8 +20,8 @@ rule trajectory:
     benchmark:
         "results/{study}/benchmarks/trajectory/{run}.{preset}.tsv"
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=growing(500),
+        runtime=growing(5),
     conda:
         "../envs/stiffdice.yaml"
     script:

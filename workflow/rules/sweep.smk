@@ -16,8 +16,8 @@ rule shard:
         "results/{study}/benchmarks/shard/{sweep}/{shard}.tsv"
     priority: 10
     resources:
-        mem_mb=700,
-        runtime=30,
+        mem_mb=growing(700),
+        runtime=growing(30),
     conda:
         "../envs/stiffdice.yaml"
     script:
@@ -42,8 +42,8 @@ rule collect:
         "results/{study}/benchmarks/collect/{sweep}.tsv"
     priority: 10
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=growing(1000),
+        runtime=growing(10),
     conda:
         "../envs/stiffdice.yaml"
     script:
@@ -69,8 +69,8 @@ rule frontier:
         "results/{study}/benchmarks/frontier/{sweep}.tsv"
     priority: 10
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=growing(1000),
+        runtime=growing(10),
     conda:
         "../envs/stiffdice.yaml"
     script:
