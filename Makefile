@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff peers study status report archive bench test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff peers study status report archive bench sweep-million test test-fast lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -51,6 +51,9 @@ archive: report  ## run config/NAME.yaml and pack it with all that made it, into
 
 bench: $(READY)  ## measure how fast it is, into results/bench/, and compare with the last time
 	@$(BIN)/stiffdice bench
+
+sweep-million: $(READY)  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into results/scale/ (about half an hour)
+	@$(BIN)/python workflow/million.py $(MILLION)
 
 test: $(READY)  ## run all tests
 	@$(BIN)/python -m pytest

@@ -12,6 +12,7 @@ from hypothesis import settings
 from stiffdice import study, sweep
 from stiffdice.io.read import parts
 from stiffdice.scene import Scene, from_mapping
+from tests import rounds
 
 # The first call of a kernel may compile it.
 settings.register_profile("stiffdice", deadline=None)
@@ -91,12 +92,7 @@ def small(plan):
 @pytest.fixture(scope="session")
 def shards(plan, tmp_path_factory):
     """The files of that sweep's shards."""
-    folder = tmp_path_factory.mktemp("shards")
-    paths = []
-    for name, columns in plan.shards().items():
-        paths.append(folder / f"{name}.h5")
-        sweep.compute(plan, columns, paths[-1])
-    return paths
+    return rounds.compute(plan, tmp_path_factory.mktemp("shards"))
 
 
 @pytest.fixture(scope="session")

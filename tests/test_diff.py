@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import shutil
@@ -16,7 +15,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiffdice import cli, sweep
+from stiffdice import cli
 from stiffdice.diff import cells, compare
 from stiffdice.diff.files import dataset_difference
 from stiffdice.diff.ulps import UNORDERED, ulps
@@ -27,6 +26,7 @@ from stiffdice.io.layout import run_dataset
 from stiffdice.io.write import write_dataset
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
+from tests import rounds
 
 ANY = st.floats(width=64)
 NUMBERS = st.floats(width=64, allow_nan=False)
@@ -314,13 +314,12 @@ def test_text_of_files_does_not_command_a_terminal(pair):
     assert "\x1b" not in str(caught.value)
 
 
-def compute(plan, folder):
-    """Compute a sweep as the workflow does, into the folder of a study."""
+def compute(plan, size, folder):
+    """Compute a sweep into the folder of a study, so many columns to a shard."""
     (folder / "shards").mkdir(parents=True)
     lines = ["shard,cells"]
-    for name, columns in plan.shards().items():
-        sweep.compute(plan, columns, folder / "shards" / f"{name}.h5")
-        lines.append(f"{name},{5 * len(columns)}")
+    for path in rounds.by_columns(plan, size, folder / "shards"):
+        lines.append(f"{path.stem},{5 * size}")
     (folder / "shards.csv").write_text("\n".join(lines) + "\n")
 
 
@@ -330,7 +329,7 @@ def dealt(small, tmp_path_factory):
     found = {}
     for size in (1, 4):
         found[size] = tmp_path_factory.mktemp("dealt") / "study"
-        compute(dataclasses.replace(small, columns_per_shard=size), found[size] / "sweeps" / "grid")
+        compute(small, size, found[size] / "sweeps" / "grid")
     return found
 
 

@@ -13,6 +13,7 @@ from stiffdice.scene import from_mapping
 from stiffdice.schemes import SCHEMES
 from stiffdice.simulate import simulate
 from stiffdice.verdict import Verdict
+from tests import rounds
 
 BOUNCING = {
     "ground": {"contact": "gated", "stiffness": 2e3, "damping": 0.3, "friction": 0.2},
@@ -46,7 +47,7 @@ def tumbling():
 def small(plan):
     """A sweep of a few cells, one of which blows up."""
     spans = {"stiffness": {"from": 1e2, "to": 1e4, "count": 3}, "omega_h": {"from": 2.5, "to": 0.3, "count": 6}}
-    return dataclasses.replace(plan, **spans, members=4, refine=0, columns_per_shard=6)
+    return dataclasses.replace(plan, **spans, members=4, refine=0)
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["early", "late"])
@@ -54,7 +55,7 @@ def shard(small, request, tmp_path_factory):
     """The runs of that sweep, ended early or not."""
     path = tmp_path_factory.mktemp("shard") / "x.h5"
     planned = dataclasses.replace(small, early_stop=request.param)
-    sweep.compute(planned, planned.columns(), path)
+    sweep.compute(planned, rounds.scan(planned), path)
     return open_file(path)
 
 
@@ -62,7 +63,7 @@ def shard(small, request, tmp_path_factory):
 def whole(small, tmp_path_factory):
     """That sweep, judged."""
     path = tmp_path_factory.mktemp("whole") / "x.h5"
-    sweep.compute(small, small.columns(), path)
+    sweep.compute(small, rounds.scan(small), path)
     return sweep.collect(parts(path, 7), small.criteria)
 
 

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+import statistics
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice import cli, job_log, results, status, status_text
+from stiffdice import cli, job_log, results, shards, status, status_text
 from stiffdice import study as studies
 from stiffdice.commands import status as command
 from stiffdice.errors import InputError
@@ -89,7 +90,8 @@ def by(process, host=None):
 
 def test_nothing_is_there_at_first(study, tmp_path):
     found = status.of(study, tmp_path / "nowhere")
-    first = sum(len(sweep.scan(column)) for sweep in study.sweeps.values() for column in sweep.columns())
+    (sweep,) = study.sweeps.values()
+    first = sum(len(sweep.scan(column)) for column in sweep.columns())
     assert {standing.state for standing in found.standings} == {found.state} == {State.WAITING}
     assert found.cells["steps-needed"] == (first, True, 0, 0, 0, 0)
     assert (found.left.seconds, found.left.unknown) == (0, len(results.of(study)))
@@ -100,10 +102,11 @@ def test_nothing_is_there_at_first(study, tmp_path):
 def test_all_is_done_at_last(made):
     found = made.look()
     assert found.state is State.DONE
-    assert found.cells["steps-needed"] == (600, False, 600, 0, 0, 4800)
+    count = len(plan_of(made))
+    assert found.cells["steps-needed"] == (200 * count, False, 200 * count, 0, 0, 1600 * count)
     assert found.left == (0, 0, 1)
     assert status_text.failures(found) == ""
-    assert (found.use.planned, found.use.stale) == (3000, {})
+    assert (found.use.planned, found.use.stale) == (1000 * count, {})
 
 
 @pytest.mark.parametrize(
@@ -193,13 +196,17 @@ def test_what_stands_on_a_failure_is_not_done(made):
     found = made.look()
     assert found.state is State.FAILED
     assert [f"{part.result.stage} {part.result.name}" for part in found.stuck] == [
+        "survey steps-needed/0",
+        *(f"shard steps-needed/{name}" for name in shards.rounds(plan_of(made), 1)),
         *("collect steps-needed", "frontier steps-needed", "figure frontier"),
     ]
     assert found.ready == []
-    assert found.cells["steps-needed"][2:] == (400, 0, found.cells["steps-needed"].planned - 400, 3200)
+    done = 200 * (len(shards.rounds(plan_of(made), 0)) - 1)
+    assert found.cells["steps-needed"][2:] == (done, 0, found.cells["steps-needed"].planned - done, 8 * done)
     told = status_text.failures(found)
     assert f"shard {shard.name}  no room\n    log: results/quick/{shard.log}\n" in told
-    assert "not made because of that: collect steps-needed, frontier steps-needed, figure frontier" in told
+    assert "not made because of that: survey steps-needed/0, shard steps-needed/" in told
+    assert ", collect steps-needed, frontier steps-needed, figure frontier" in told
 
 
 def test_what_nobody_says_why_is_told(made):
@@ -212,9 +219,12 @@ def test_needs_are_as_the_workflow_has_them(study):
         f"{result.stage} {result.name}": {f"{part.stage} {part.name}" for part in below}
         for result, below in status.needs(study).items()
     }
-    shards = {f"shard steps-needed/{shard}" for shard in study.sweeps["steps-needed"].shards()}
+    plan = shards.of(study.sweeps["steps-needed"])
+    first, second = ({f"shard steps-needed/{shard}" for shard in shards.rounds(plan, number)} for number in (0, 1))
     assert {name: below for name, below in names.items() if below} == {
-        "collect steps-needed": shards,
+        **{shard: {"survey steps-needed/0"} for shard in second},
+        "survey steps-needed/0": first,
+        "collect steps-needed": {*first, *second, "survey steps-needed/0"},
         "frontier steps-needed": {"collect steps-needed"},
         "figure frontier": {"frontier steps-needed"},
         "figure position": {"trajectory figure-04.as_listed", "trajectory figure-04.as_written"},
@@ -237,33 +247,36 @@ def test_running_shards_count_by_their_tenths(made):
         made.log(shard, job_log.begun(), job_log.tenth(0.1), job_log.tenth(share))
     cells = made.look().cells["steps-needed"]
     plan = made.study.sweeps["steps-needed"]
-    sizes = [sum(len(plan.scan(column)) for column in columns) for columns in plan.shards().values()]
-    assert cells.planned == sizes[0] + sizes[1] + 200
-    assert cells.done == 200 + sizes[0] * 0.5 + sizes[1] * 0.25
+    sizes = [sum(len(piece.steps) for piece in shard.pieces) for shard in shards.of(plan).values()]
+    assert sizes[2:] == [0]  # in the second round, of which nothing is known yet
+    assert cells.planned == sizes[0] + sizes[1]
+    assert cells.at_least
+    assert cells.done == sizes[0] * 0.5 + sizes[1] * 0.25
     assert cells.done + cells.running == cells.planned
-    assert cells.runs == 1600
+    assert cells.runs == 0
 
 
 def test_the_time_left_is_that_of_like_jobs(made):
     made.unmake(made.named("shard"))
     made.unmake(made.named("trajectory"))
     found = made.look(cores=1).left
-    # A shard, collect, frontier and the figure; a trajectory and its figure.
-    shards = [sum(column.stiffness**0.5 for column in columns) for columns in plan_of(made).values()]
-    rates = sorted(10 / weight for weight in shards[1:])
-    assert found.seconds == pytest.approx(shards[0] * sum(rates) / 2 + 10 * 5)
+    # A shard and all of the next round, survey, collect, frontier and the figure; a trajectory and its figure.
+    plan = plan_of(made).values()
+    rate = statistics.median(10 / shard.seconds for shard in [*plan][1:])
+    later = sum(shard.round > 0 for shard in plan)
+    assert found.seconds == pytest.approx(next(iter(plan)).seconds * rate + 10 * (later + 6))
     assert found.unknown == 0
 
 
 def plan_of(made):
-    return made.study.sweeps["steps-needed"].shards()
+    return shards.of(made.study.sweeps["steps-needed"])
 
 
 def test_while_a_run_is_under_way_what_it_cannot_make_takes_no_time(made):
     shard, run = made.named("shard"), made.named("trajectory")
     made.unmake(shard, benchmark=False)
     made.log(shard, job_log.begun(), job_log.failed(InputError("no room")))
-    assert made.look(cores=1).left.seconds == pytest.approx(40)
+    assert made.look(cores=1).left.seconds == pytest.approx(60)
     made.unmake(run, benchmark=False)
     made.log(run, job_log.begun())
     assert made.look(cores=1).left.seconds == pytest.approx(20, abs=1)  # the run and its figure
@@ -299,7 +312,7 @@ def test_the_exit_status_says_how_it_stands(project):
 
 
 def test_studies_without_results_are_not_listed(project):
-    assert re.fullmatch(r"quick: 12 of 12 done; 600 of 600 cells; [0-9.]+ kB\n", project()[1])
+    assert re.fullmatch(r"quick: 13 of 13 done; 600 of 600 cells; [0-9.]+ kB\n", project()[1])
     shutil.rmtree("results")
     assert project() == (3, "no study has results yet; `make study STUDY=quick` makes some\n", "")
 
@@ -316,12 +329,12 @@ def test_the_page_says_it_all(project, gone):
     (project.made.folder / "runs" / "y.h5.damaged").write_bytes(b"x" * 4000)
     page = project("quick")[1]
     for told in (
-        "results     6 of 12 done, 1 running, 1 failed, 4 waiting\n",
-        "shard       2 of 3 done, 1 failed\n",
+        "results     5 of 13 done, 1 running, 1 failed, 6 waiting\n",
+        "shard       1 of 3 done, 1 failed, 1 waiting\n",
         f"running\n  trajectory {run.name}  for ",
         ", 40% done\n",
         f"failed\n  shard {shard.name}  no room\n    log: results/quick/{shard.log}\n",
-        "not made because of that: collect steps-needed, frontier steps-needed, figure frontier\n",
+        ", collect steps-needed, frontier steps-needed, figure frontier\n",
         "stale       1 shard of other grids, 3 kB\n",
         ", unfinished 4 kB\n",
         f"leftover    runs/.x.h5.{gone}.part, 2 kB, of process {gone}, which does not run on this host\n",
@@ -337,7 +350,7 @@ def test_programs_get_the_same_numbers(project):
     ended, out, _ = project("quick", "--json")
     data = json.loads(out)
     assert (ended, data["state"]) == (1, "failed")
-    assert data["results"] == {"done": 8, "running": 0, "interrupted": 0, "failed": 1, "waiting": 3}
+    assert data["results"] == {"done": 7, "running": 0, "interrupted": 0, "failed": 1, "waiting": 5}
     (failed,) = [job for job in data["jobs"] if job["state"] == "failed"]
     assert (failed["name"], failed["reason"], failed["files"]) == (shard.name, "no room", list(shard.files))
     assert datetime.fromisoformat(failed["begun"]) <= datetime.now(UTC)
@@ -378,7 +391,7 @@ def test_ctrl_c_ends_watching_as_it_stands(project, monkeypatch):
     monkeypatch.setattr(command.time, "sleep", stop)
     ended, out, err = project("quick", "--watch")
     assert (ended, err) == (3, "")
-    assert "10 of 12 done, 2 waiting" in out  # the run and its figure
+    assert "11 of 13 done, 2 waiting" in out  # the run and its figure
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiffdice import catalogue, study, theory
+from stiffdice import catalogue, shards, study, theory
 from stiffdice.criteria import CRITERIA
 from stiffdice.errors import InputError
 from stiffdice.grid import Column
@@ -106,37 +106,17 @@ def test_a_column_is_run_on_its_own_ground(plan):
     assert scene.launch == plan.scene.launch
 
 
-def test_shards_share_out_all_columns_evenly(paper):
-    sweep = paper.sweeps["steps-needed"]
-    shards = sweep.shards()
-    dealt = [column for columns in shards.values() for column in columns]
-    assert sorted(dealt) == sorted(sweep.columns())
-    assert {len(columns) for columns in shards.values()} == {3}
-    # Work grows with the steps, and these with the root of the stiffness.
-    work = [sum(np.sqrt(column.stiffness) for column in columns) for columns in shards.values()]
-    assert max(work) < 6 * min(work)
-
-
-@pytest.mark.parametrize("size", [1, 3, 4, 10, 1000])
-def test_every_column_is_in_one_shard_whatever_its_size(sweep_of, size):
-    sweep = sweep_of(columns_per_shard=size)
-    shards = list(sweep.shards().values())
-    assert max(map(len, shards)) <= size
-    assert sorted(column for columns in shards for column in columns) == sorted(sweep.columns())
-
-
 def names(sweep):
-    return set(sweep.shards())
+    return set(shards.of(sweep))
 
 
 def test_a_shards_name_tells_what_it_computes(sweep_of):
     before = names(sweep_of())
-    assert before == names(sweep_of()) == names(sweep_of(simulator="stiffdice"))
+    assert before == names(sweep_of()) == names(sweep_of(simulator="stiffdice")) < names(sweep_of(refine=2))
     for key, value in {
         "seed": 2,
         "members": 9,
         "set": ["cube.mass=2"],
-        "refine": 2,
         "early_stop": False,
         "model": "tumbling",
         "omega_h": {"from": 3, "to": 0.2, "count": 41},
@@ -155,7 +135,8 @@ def test_another_tolerance_needs_other_runs_only_where_runs_depend_on_it(sweep_o
     for criteria in ({"energy": 0.05, "apex": 0.03}, {"energy": 0.05}):
         after = names(sweep_of(**fixed, criteria=criteria))
         assert (after == before) == kept
-        assert kept or after.isdisjoint(before)
+        scan = set(shards.rounds(shards.of(sweep_of(**fixed, criteria=criteria)), 0))
+        assert after & before == (set() if early_stop else scan)
 
 
 def test_a_horizon_matters_only_to_a_trajectory(sweep_of):
@@ -283,7 +264,12 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         (f"{SWEEP}.early_stop", 3, f"{SWEEP}.early_stop = 3: allowed is true or false"),
         (f"{SWEEP}.horizon", 11, f"{SWEEP}: horizon = 11: allowed is a number <= duration = 10 [s]"),
         (f"{SWEEP}.horizon", 0, f"{SWEEP}.horizon = 0: allowed is a finite number > 0 [s]"),
-        (f"{SWEEP}.columns_per_shard", 0, f"{SWEEP}.columns_per_shard = 0: allowed is a whole number from 1"),
+        (f"{SWEEP}.seconds_per_job", 0, f"{SWEEP}.seconds_per_job = 0: allowed is a number > 0, at most 1e6 [s]"),
+        (
+            f"{SWEEP}.omega_h",
+            [],
+            f"{SWEEP}.omega_h = []: allowed is {{from, to, count}}, or a list of such",
+        ),
         (f"{SWEEP}.criteria", {"energy": -1}, f"{SWEEP}.criteria.energy = -1: allowed is a number from 0 to 1e6"),
         (f"{SWEEP}.criteria", {"beauty": 1}, f"{SWEEP}: criteria.beauty: unknown; allowed are finite, energy, apex"),
         (f"{SWEEP}.criteria", {}, f"{SWEEP}.criteria = {{}}: allowed are criteria, each with its tolerance"),

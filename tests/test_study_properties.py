@@ -12,7 +12,7 @@ import yaml
 from hypothesis import Phase, given, reject, settings
 from hypothesis import strategies as st
 
-from stiffdice import study
+from stiffdice import shards, study
 from stiffdice.errors import InputError
 from stiffdice.grid import Sweep, geometric
 from stiffdice.scene import Scene
@@ -59,7 +59,7 @@ base = {
 more = {
     "seed": st.integers(0, 2**40),
     "refine": st.integers(0, 3),
-    "columns_per_shard": st.integers(1, 40),
+    "seconds_per_job": st.floats(1e-6, 1e3),
     "early_stop": st.booleans(),
     "scheme": st.sampled_from(["symplectic_euler", "rk4"]),
 }
@@ -85,7 +85,7 @@ def planned(asked):
         {"energy": 0.05},
         asked.get("early_stop", True),
         Scene().duration,
-        asked.get("columns_per_shard", 4),
+        asked.get("seconds_per_job"),
     )
 
 
@@ -99,7 +99,7 @@ def test_a_study_asks_for_what_is_in_its_file(load, asked):
     assert sweep.columns() == planned(asked).columns()
     for column in sweep.columns():
         assert sweep.scan(column) == dataclasses.replace(planned(asked), scene=sweep.scene).scan(column)
-    assert load(copy.deepcopy(asked))[1].shards() == sweep.shards()
+    assert shards.of(load(copy.deepcopy(asked))[1]) == shards.of(sweep)
 
 
 @given(sweeps)
@@ -121,16 +121,6 @@ def test_a_sweep_has_each_column_once_and_each_scan_in_its_range(asked):
         assert steps[-1] <= max(1, math.ceil(most * (1 + 1e-9)))
 
 
-@given(sweeps)
-def test_shards_part_the_columns(asked):
-    sweep = planned(asked)
-    shards = sweep.shards()
-    dealt = [column for columns in shards.values() for column in columns]
-    assert sorted(dealt) == sorted(sweep.columns())
-    assert all(0 < len(columns) <= sweep.columns_per_shard for columns in shards.values())
-    assert max(map(len, shards.values())) - min(map(len, shards.values())) <= 1
-
-
 @given(sweeps, st.data())
 def test_a_columns_scan_is_its_own_whatever_else_is_in_the_sweep(asked, data):
     """So that other shards, or a grid that became denser, change no number of it."""
@@ -140,7 +130,6 @@ def test_a_columns_scan_is_its_own_whatever_else_is_in_the_sweep(asked, data):
         sweep,
         stiffness={"from": column.stiffness, "to": column.stiffness, "count": 1},
         contact=(column.contact,),
-        columns_per_shard=7,
         members=sweep.members + 1,
     )
     assert alone.scan(column) == sweep.scan(column)
@@ -149,11 +138,11 @@ def test_a_columns_scan_is_its_own_whatever_else_is_in_the_sweep(asked, data):
 @given(sweeps, st.data())
 def test_a_shards_name_is_of_what_it_computes_and_of_nothing_else(asked, data):
     sweep = planned(asked)
-    assert planned(copy.deepcopy(asked)).shards() == sweep.shards()
+    assert shards.of(planned(copy.deepcopy(asked))) == shards.of(sweep)
     other = dataclasses.replace(
         sweep, **data.draw(st.sampled_from([{"seed": sweep.seed + 1}, {"members": sweep.members + 1}]))
     )
-    assert set(other.shards()).isdisjoint(sweep.shards())
+    assert set(shards.of(other)).isdisjoint(shards.of(sweep))
 
 
 @given(stiffnesses)

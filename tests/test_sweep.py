@@ -17,6 +17,7 @@ from stiffdice.io.read import open_file
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
 from stiffdice.verdict import Verdict
+from tests import rounds
 from tests.conftest import ROOT, each
 
 DEFAULTS = {"finite": 0.0, "energy": 0.05, "apex": 0.02}
@@ -38,15 +39,14 @@ def small(**changes):
         criteria=DEFAULTS,
         early_stop=False,
         horizon=10.0,
-        columns_per_shard=4,
     )
     return dataclasses.replace(planned, **changes)
 
 
 def computed(planned, folder, columns=None, name="x"):
-    """The shard that these columns (all of them by default) make."""
+    """The shard that the scans of these columns (all of them by default) make."""
     path = folder / f"{name}.h5"
-    sweep.compute(planned, planned.columns() if columns is None else columns, path)
+    sweep.compute(planned, rounds.scan(planned, columns), path)
     return open_file(path)
 
 
@@ -65,7 +65,7 @@ def test_cells_do_not_know_their_shard(tmp_path):
 
 def test_equal_shards_are_equal_bytes(tmp_path):
     for name in "ab":
-        computed(small(refine=1), tmp_path, name=name)
+        computed(small(), tmp_path, name=name)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
@@ -171,15 +171,16 @@ def test_each_round_adds_what_the_rounds_before_left_in_doubt(tmp_path):
         rows = zip(found.contact.values, found.stiffness.values, found.steps.values, strict=True)
         return {row: tuple(found[name].isel(cell=k).values.tobytes() for name in names) for k, row in enumerate(rows)}
 
-    for rounds in (1, 2, 3):
+    for number in (1, 2, 3):
         wanted = set()
         for column in planned.columns():
             law = planned.contact.index(column.contact)
             scan = before.isel(cell=(before.contact.values == law) & (before.stiffness.values == column.stiffness))
             passing = 1 - scan.failing.values / planned.members
-            added = planned.finer(column, scan.steps.values.tolist(), passing, rounds)
+            added = planned.finer(column, scan.steps.values.tolist(), passing, number)
             wanted |= {(law, column.stiffness, steps) for steps in added}
-        after = collected(small(refine=rounds), tmp_path)
+        further = small(refine=number)
+        after = rounds.judged(further, rounds.compute(further, tmp_path))
         old, new = cells(before), cells(after)
         assert wanted
         assert set(new) == set(old) | wanted
@@ -214,10 +215,10 @@ def test_a_tumbling_sweep_turns_its_members_and_compares_each_with_its_own_refer
     assert meanings_of(sweep.collect([runs], planned.criteria).criterion) == ["finite", "energy", "trajectory"]
 
 
-def test_progress_is_told_column_by_column(tmp_path):
-    planned, told = small(), []
-    sweep.compute(planned, planned.columns(), tmp_path / "x.h5", told.append)
-    assert len(told) == len(planned.columns())
+def test_progress_is_told_within_a_column(tmp_path):
+    planned, told = small(members=sweep.BLOCK + 1, omega_h={"from": 3.0, "to": 0.5, "count": 20}), []
+    sweep.compute(planned, rounds.scan(planned), tmp_path / "x.h5", told.append)
+    assert len(told) == 2 * 2 * len(planned.columns())  # two blocks of members, two handfuls of cells
     assert told == sorted(told)
     assert told[-1] == 1.0
 
@@ -327,9 +328,11 @@ def test_the_scan_is_where_theory_says_trouble_is(collected, plan):
 PEAK = """
 import dataclasses, resource, sys
 from stiffdice import study, sweep
+from stiffdice.grid import Piece
 plan = study.load("config/quick.yaml", "workflow/schemas/study.schema.yaml").sweeps["steps-needed"]
 plan = dataclasses.replace(plan, members=int(sys.argv[1]), contact=("gated",))
-sweep.compute(plan, plan.columns()[:1], sys.argv[2])
+column = plan.columns()[0]
+sweep.compute(plan, [Piece(column, plan.scan(column))], sys.argv[2])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
 """
 

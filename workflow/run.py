@@ -12,7 +12,10 @@ from pathlib import Path
 
 import room
 
-STAGES = ("trajectory", "experiment", "timings", "shard", "collect", "frontier", "table", "figure", "animation")
+STAGES = (
+    *("trajectory", "experiment", "timings", "shard", "survey", "collect", "frontier"),
+    *("table", "figure", "animation"),
+)
 ROOT = Path(__file__).resolve().parent.parent
 
 # The library of this checkout, as the jobs have it.

@@ -1,9 +1,8 @@
-"""The grid of a sweep: which stiffnesses, which steps are tried first and which between them, and who computes what."""
+"""The grid of a sweep: which stiffnesses, which steps are tried first and which between them."""
 
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -16,6 +15,10 @@ from stiffdice.scene import Scene
 from stiffdice.simulators import OURS
 from stiffdice.state import Array
 
+# `count` values from `from` to `to`; several spans are all the values of each.
+Span = Mapping[str, float]
+Spans = Span | Sequence[Span]
+
 
 class Column(NamedTuple):
     """One stiffness under one contact law: what a scan over steps is made for."""
@@ -24,29 +27,37 @@ class Column(NamedTuple):
     stiffness: float  # [kg/s²]
 
 
+class Piece(NamedTuple):
+    """Some cells of a column; steps: ascending."""
+
+    column: Column
+    steps: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Sweep:
-    """A grid of stiffness and steps, in shards.
+    """A grid of stiffness and steps.
 
     criteria: tolerances of those asked. early_stop: whether a run ends once all of them are decided. refine: how many
     times the scan is made twice as dense where members disagree. horizon [s]: until when `trajectory` compares.
     model: the one computed; model_reason: why. simulator: what makes the runs; scheme: its own, if it is an engine.
+    seconds_per_job: of predicted work that one job gets; None leaves it to `shards`.
     """
 
     scene: Scene
     model: str
     scheme: str
     contact: tuple[str, ...]
-    stiffness: Mapping[str, float]
-    steps: Mapping[str, float] | None
-    omega_h: Mapping[str, float] | None
+    stiffness: Spans
+    steps: Spans | None
+    omega_h: Spans | None
     members: int
     seed: int
     refine: int
     criteria: Mapping[str, float]
     early_stop: bool
     horizon: float
-    columns_per_shard: int
+    seconds_per_job: float | None = None
     model_reason: str = AS_ASKED
     simulator: str = OURS
 
@@ -55,23 +66,27 @@ class Sweep:
         return self.scene.with_ground(contact=column.contact, stiffness=column.stiffness)
 
     def columns(self) -> list[Column]:
-        """Return all columns: contact law by law, stiffness by stiffness."""
-        stiffnesses = dict.fromkeys(geometric(self.stiffness))
+        """Return all columns: contact law by law, stiffness by stiffness, ascending."""
+        stiffnesses = sorted({value for span in _each(self.stiffness) for value in geometric(span)})
         return [Column(contact, stiffness) for contact in self.contact for stiffness in stiffnesses]
 
     @property
-    def _grid(self) -> Mapping[str, float]:
-        """The span of steps, given as counts or as ωh."""
+    def _grid(self) -> Spans:
+        """The spans of steps, given as counts or as ωh."""
         grid = self.omega_h if self.steps is None else self.steps
         assert grid is not None, "the schema asks for one of them"
         return grid
 
     def step_range(self, stiffness: float) -> tuple[float, float]:
         """Return the fewest and the most steps of the grid at one stiffness [kg/s²], not rounded."""
-        ends = self._grid
+        ranges = [self._range_of(span, stiffness) for span in _each(self._grid)]
+        return min(first for first, _ in ranges), max(last for _, last in ranges)
+
+    def _range_of(self, span: Span, stiffness: float) -> tuple[float, float]:
+        ends = span
         if self.steps is None:
             scene = self.scene.with_ground(stiffness=stiffness)
-            ends = {end: theory.steps_for(scene, ends[end]) for end in ("from", "to")}
+            ends = {end: theory.steps_for(scene, span[end]) for end in ("from", "to")}
         first, last = float(ends["from"]), float(ends["to"])  # NumPy has no whole numbers above 2^63
         return min(first, last), max(first, last)
 
@@ -79,11 +94,15 @@ class Sweep:
         """Return the step counts first tried in a column: spread evenly in their logarithm, jittered within each part.
 
         Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
+        What a span scans does not depend on the others.
         """
-        low, high = np.log(self.step_range(column.stiffness))
-        count = int(self._grid["count"])
+        return sorted({steps for span in _each(self._grid) for steps in self._scan_of(span, column)})
+
+    def _scan_of(self, span: Span, column: Column) -> set[int]:
+        low, high = np.log(self._range_of(span, column.stiffness))
+        count = int(span["count"])
         part = (np.arange(count) + self._jitter(column, 0).random(count)) / count
-        return sorted({max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)})
+        return {max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)}
 
     def finer(self, column: Column, scanned: Sequence[int], passing: Array, rounds: int) -> list[int]:
         """Return step counts to add to a scan: one between any two neighbours whose members do not all agree.
@@ -101,38 +120,41 @@ class Sweep:
         key = int.from_bytes(hashlib.sha256(repr(column.stiffness).encode()).digest()[:8])
         return np.random.default_rng([self.seed, key, rounds] if rounds else [self.seed, key])
 
-    def shards(self) -> dict[str, list[Column]]:
-        """Return the columns of each shard, by the shard's id: a digest of all that its numbers depend on but the code.
-
-        Columns are dealt out in turn, so that every shard gets its share of the expensive ones.
-        """
-        columns = self.columns()
-        count = -(-len(columns) // self.columns_per_shard)
-        return {self._digest(columns[k::count]): columns[k::count] for k in range(count)}
-
     @property
-    def config(self) -> dict[str, Any]:
-        """What the runs of a column depend on besides its ground, the scene and the code, as plain data."""
+    def of_runs(self) -> dict[str, Any]:
+        """What a run depends on besides its cell, the scene and the code, as plain data."""
         config: dict[str, Any] = {
             "model": self.model,
             "model_reason": self.model_reason,
             "simulator": self.simulator,
             "scheme": self.scheme,
             "members": self.members,
-            "seed": self.seed,
-            "refine": self.refine,
-            "omega_h" if self.steps is None else "steps": dict(self._grid),
         }
         if "trajectory" in self.criteria:
             config["horizon"] = self.horizon
-        # Other tolerances need other runs only where a run stops, or a scan is refined, because of them.
-        if self.early_stop or self.refine:
-            config |= {"criteria": dict(self.criteria), "early_stop": self.early_stop}
+        # Other tolerances need other runs only where a run stops because of them.
+        if self.early_stop:
+            config |= {"criteria": dict(self.criteria), "early_stop": True}
         return config
 
-    def _digest(self, columns: Sequence[Column]) -> str:
-        plan = [self.scene.digest, self.config, columns]
-        return hashlib.sha256(json.dumps(plan, sort_keys=True).encode()).hexdigest()[:12]
+    @property
+    def of_cells(self) -> dict[str, Any]:
+        """What the places of cells depend on besides columns, scene and code: by themselves, and by what was found."""
+        spans = [dict(span) for span in _each(self._grid)]
+        grid = {"omega_h" if self.steps is None else "steps": spans if len(spans) > 1 else spans[0]}
+        return self.of_runs | grid | {"seed": self.seed, "criteria": dict(self.criteria), "early_stop": self.early_stop}
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """What the runs of all columns depend on besides the scene and the code, as plain data."""
+        config = self.of_cells | {"refine": self.refine}
+        if not (self.early_stop or self.refine):  # the tolerances then place no cell, and stop no run
+            del config["criteria"], config["early_stop"]
+        return config
+
+
+def _each(spans: Spans) -> Sequence[Span]:
+    return [spans] if isinstance(spans, Mapping) else spans
 
 
 def geometric(span: Mapping[str, float]) -> list[float]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from stiffdice import shards
 from stiffdice.study import Study
 
 
 class Result(NamedTuple):
     """What one job makes: files under results/STUDY/, in a stage of the workflow, under a name of its own there.
 
-    stage: `trajectory`, `experiment`, `timings`, `shard`, `collect`, `frontier`, `figure`, `animation` or `table`.
+    stage: `trajectory`, `experiment`, `timings`, `shard`, `survey`, `collect`, `frontier`, `figure`, `animation` or
+    `table`.
     """
 
     stage: str
@@ -44,8 +46,12 @@ def _made(study: Study) -> Iterator[Result]:
         yield Result("timings", name, (f"benchmarks/timings/{name}.h5",))
     for name, sweep in study.sweeps.items():
         top = f"sweeps/{name}"
-        for shard in sweep.shards():
-            yield Result("shard", f"{name}/{shard}", (f"{top}/shards/{shard}.h5",))
+        plan = shards.of(sweep)
+        for number in range(sweep.refine + 1):
+            for shard in shards.rounds(plan, number):
+                yield Result("shard", f"{name}/{shard}", (f"{top}/shards/{shard}.h5",))
+            if number < sweep.refine:
+                yield Result("survey", f"{name}/{number}", (f"{top}/surveys/{number}.h5",))
         yield Result("collect", name, (f"{top}/sweep.h5", f"{top}/shards.csv"))
         yield Result("frontier", name, (f"{top}/frontier.h5", f"{top}/frontier.csv"))
 

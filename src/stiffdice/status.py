@@ -14,10 +14,11 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import NamedTuple
 
-from stiffdice import disk_use, job_log, results, time_left
+from stiffdice import disk_use, job_log, results, shards, time_left
 from stiffdice.catalogue import DRAWINGS, TABLES
-from stiffdice.grid import Column, Sweep
+from stiffdice.grid import Sweep
 from stiffdice.results import Result
+from stiffdice.shards import Shard
 from stiffdice.study import PlannedFigure, Study
 
 
@@ -138,10 +139,10 @@ def of(study: Study, folder: Path, cores: int | None = None) -> Status:
     )
 
 
-def _plans(study: Study) -> dict[str, dict[str, list[Column]]]:
-    """Return the columns of each shard of each sweep, by the names of their results."""
+def _plans(study: Study) -> dict[str, dict[str, Shard]]:
+    """Return the shards of each sweep, by the names of their results."""
     return {
-        name: {f"{name}/{shard}": columns for shard, columns in sweep.shards().items()}
+        name: {f"{name}/{shard}": plan for shard, plan in shards.of(sweep).items()}
         for name, sweep in study.sweeps.items()
     }
 
@@ -150,23 +151,38 @@ def needs(study: Study) -> dict[Result, tuple[Result, ...]]:
     """Return for each result of a study those that it is made from."""
     every = results.of(study)
     named = {(result.stage, result.name): result for result in every}
-    shards = {name: tuple(named["shard", shard] for shard in plan) for name, plan in _plans(study).items()}
+    plans = _plans(study)
 
-    def needed(result: Result) -> tuple[Result, ...]:
+    def collected(sweep: str, rounds: int) -> Iterator[tuple[str, str]]:
+        """Yield the stages and names of what the first so many rounds are judged from."""
+        for shard, plan in plans[sweep].items():
+            if plan.round < rounds:
+                yield "shard", shard
+        for number in range(rounds - 1):
+            yield "survey", f"{sweep}/{number}"
+
+    def keys(result: Result) -> Iterator[tuple[str, str]]:
+        """Yield the stages and names of what a result is made from."""
+        sweep, _, number = result.name.partition("/")
         match result.stage:
+            case "shard":
+                before = plans[sweep][result.name].round
+                if before:
+                    yield "survey", f"{sweep}/{before - 1}"
+            case "survey":
+                yield from collected(sweep, int(number) + 1)
             case "collect":
-                return shards[result.name]
+                yield from collected(sweep, study.sweeps[sweep].refine + 1)
             case "frontier":
-                return (named["collect", result.name],)
+                yield "collect", sweep
             case "figure" | "animation":
                 planned = study.figures[result.name]
-                return tuple(named[key] for key in _shown_by(study, planned, DRAWINGS[planned.draw].given))
+                yield from _shown_by(study, planned, DRAWINGS[planned.draw].given)
             case "table":
                 planned = study.tables[result.name]
-                return tuple(named[key] for key in _shown_by(study, planned, TABLES[planned.draw].given))
-        return ()
+                yield from _shown_by(study, planned, TABLES[planned.draw].given)
 
-    return {result: needed(result) for result in every}
+    return {result: tuple(named[key] for key in keys(result)) for result in every}
 
 
 # The stage whose results a figure or a table shows, by what it is given.
@@ -218,14 +234,17 @@ def _as_told(result: Result, told: job_log.Told, made: float) -> Standing:
     return Standing(result, State.INTERRUPTED, f"ended without a word; killed? (its log stops at {last})", told.begun)
 
 
-def _cells(sweep: Sweep, plan: Mapping[str, list[Column]], standings: Iterable[Standing]) -> Cells:
+def _cells(sweep: Sweep, plan: Mapping[str, Shard], standings: Iterable[Standing]) -> Cells:
     sums = {"planned": 0.0, "done": 0.0, "running": 0.0, "failed": 0.0, "runs": 0.0}
     at_least = False
     for standing in standings:
         if standing.result.stage != "shard" or standing.result.name not in plan:
             continue
-        count = standing.cells or sum(len(sweep.scan(column)) for column in plan[standing.result.name])
-        at_least |= sweep.refine > 0 and standing.cells is None
+        shard = plan[standing.result.name]
+        count = standing.cells
+        if count is None:
+            count = sum(len(piece.steps) for piece in shard.pieces)
+            at_least |= shard.round > 0
         sums["planned"] += count
         match standing.state:
             case State.DONE:
@@ -240,11 +259,11 @@ def _cells(sweep: Sweep, plan: Mapping[str, list[Column]], standings: Iterable[S
 
 
 # Stages whose jobs are much alike; of others only what the same job took before is known.
-_ALIKE = ("trajectory", "collect", "frontier", "figure", "table")
+_ALIKE = ("trajectory", "survey", "collect", "frontier", "figure", "table")
 
 
 def _left(
-    plans: Mapping[str, Mapping[str, list[Column]]],
+    plans: Mapping[str, Mapping[str, Shard]],
     folder: Path,
     standings: Collection[Standing],
     stuck: Collection[Result],
@@ -253,22 +272,21 @@ def _left(
 ) -> time_left.Left:
     """Return the time left: of what the run that is under way still makes, or if none is of all that is not done."""
     running = sum(standing.state is State.RUNNING for standing in standings)
-    columns = {shard: columns for plan in plans.values() for shard, columns in plan.items()}
-    jobs = [_job(standing, columns.get(standing.result.name, []), folder, now) for standing in standings]
+    seconds = {name: shard.seconds for plan in plans.values() for name, shard in plan.items()}
+    jobs = [_job(standing, seconds.get(standing.result.name, 1.0), folder, now) for standing in standings]
     if running:
         ended = [part.result in stuck or part.state in (State.FAILED, State.INTERRUPTED) for part in standings]
         jobs = [job._replace(due=job.due and not over) for job, over in zip(jobs, ended, strict=True)]
     return time_left.of(jobs, cores or max(1, running))
 
 
-def _job(standing: Standing, columns: list[Column], folder: Path, now: datetime) -> time_left.Job:
-    """Return what is known of a result's job; columns: of a shard."""
+def _job(standing: Standing, weight: float, folder: Path, now: datetime) -> time_left.Job:
+    """Return what is known of a result's job; weight: how long it takes, next to others of its kind."""
     result = standing.result
     kind = {"shard": f"shard {result.name.partition('/')[0]}"} | {stage: stage for stage in _ALIKE}
     job = time_left.Job(
         kind=kind.get(result.stage, f"{result.stage} {result.name}"),
-        # Of a shard: steps grow with the root of the stiffness.
-        weight=sum(max(column.stiffness, 1.0) ** 0.5 for column in columns) if result.stage == "shard" else 1.0,
+        weight=weight,
         took=time_left.took(folder / result.benchmark),
         due=standing.state is not State.DONE,
         alone=result.stage == "timings",

@@ -158,9 +158,9 @@ def _validate(data: object, schema: str | Path, source: str) -> None:
 
     _refuse_nan(data, "", source)
     validator = jsonschema.Draft202012Validator(yaml_file.load(schema))
-    errors = sorted(validator.iter_errors(data), key=lambda error: _RANK.get(str(error.validator), 1))
+    errors = sorted(validator.iter_errors(data), key=_rank)
     if errors:
-        raise InputError(f"{source}: {_told(errors[0])}")
+        raise InputError(f"{source}: {_told(_innermost(errors[0]))}")
 
 
 def _refuse_nan(data: object, where: str, source: str) -> None:
@@ -174,6 +174,22 @@ def _refuse_nan(data: object, where: str, source: str) -> None:
 
 # A misspelt key is told before the key that it leaves missing.
 _RANK = {"additionalProperties": 0, "required": 2, "oneOf": 3}
+
+
+def _rank(error: Any) -> int:
+    return _RANK.get(str(error.validator), 1)
+
+
+def _innermost(error: Any) -> Any:
+    """Return what is wrong within a value that may be of several kinds, if it is of one of them."""
+    if error.validator != "anyOf":
+        return error
+    others = {part.relative_schema_path[0] for part in error.context if part.validator == "type" and not part.path}
+    for part in sorted(error.context, key=_rank):
+        inner = _innermost(part)
+        if part.relative_schema_path[0] not in others and inner.validator != "anyOf":
+            return inner
+    return error
 
 
 def _told(error: Any) -> str:
@@ -360,7 +376,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         sweep["model"],
         simulators.scheme_of(simulator, sweep.get("scheme")),
         tuple(sweep["contact"]),
-        stiffness if isinstance(stiffness, Mapping) else {"from": stiffness, "to": stiffness, "count": 1},
+        {"from": stiffness, "to": stiffness, "count": 1} if isinstance(stiffness, int | float) else stiffness,
         sweep.get("steps"),
         sweep.get("omega_h"),
         int(sweep["members"]),
@@ -369,7 +385,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         {},
         bool(sweep.get("early_stop", True)),
         float(sweep.get("horizon", scene.duration)),
-        int(sweep.get("columns_per_shard", 4)),
+        sweep.get("seconds_per_job"),
         simulator=simulator,
     )
     model, reason = _model_of(asked)
@@ -386,7 +402,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
                 raise InputError(f"set: {override}: the sweep sets this itself, from its key {key}")
     if "restitution" in planned.criteria and not requirement.lands_flat(scene, _FLAT):
         raise InputError("criteria.restitution: is known exactly for flat landings only, and this cube lands tilted")
-    most = max(planned.step_range(planned.stiffness[end])[1] for end in ("from", "to"))
+    most = max(planned.step_range(column.stiffness)[1] for column in planned.columns())
     if not most <= checks.LARGEST_COUNT:
         key = "steps" if planned.steps else "omega_h"
         raise InputError(f"{key}: asks for up to {most:.3g} steps; allowed are {checks.LARGEST_COUNT}")

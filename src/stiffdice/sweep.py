@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +15,9 @@ from stiffdice.contact import LAWS
 from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.fine import references
-from stiffdice.grid import Column, Sweep
+from stiffdice.grid import Column, Piece, Sweep
 from stiffdice.io import layout
-from stiffdice.io.digest import cell_digests, digest_of_cells
+from stiffdice.io.digest import CELL, cell_digests, digest_of_cells
 from stiffdice.io.spool import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 from stiffdice.provenance import code_digest
 from stiffdice.scene import Scene
@@ -34,59 +34,61 @@ _OF_RUNS = ("touchdown_phase", "verdict", "steps_done", "steps_computed", "decid
 BLOCK = CHUNK_MEMBERS
 
 
+class Kept(Protocol):
+    """Runs that are there already, whoever keeps them."""
+
+    def has(self, column: Column, steps: int) -> bool:
+        """Return whether all members of a cell are there."""
+
+    def runs(self, column: Column, steps: int, members: slice) -> Mapping[str, npt.NDArray[Any]]:
+        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
+
+
 def compute(
-    sweep: Sweep, columns: Sequence[Column], path: str | Path, progress: Callable[[float], None] | None = None
+    sweep: Sweep,
+    pieces: Sequence[Piece],
+    path: str | Path,
+    progress: Callable[[float], None] | None = None,
+    kept: Kept | None = None,
 ) -> int:
     """Compute one shard, store it (each run's measures and verdict, dimensions cell and member), and return its cells.
 
-    What is in memory at a time is a block of members and a scan's passing shares, whatever the size of the sweep.
-    progress: called after every round of a scan with about the fraction of the work done.
+    What is in memory at a time is a block of members in some cells, whatever the size of the sweep. kept: runs that are
+    there already. progress: called with about the fraction of the work done.
     """
-    weight = np.cumsum([np.sqrt(column.stiffness) for column in columns])
-    with Spool(path, _pattern(sweep)) as spool:
-        for k, column in enumerate(columns):
-            _compute_column(sweep, column, spool)
-            if progress is not None:
-                progress(float(weight[k] / weight[-1]))
+    total, done = sum(sum(piece.steps) for piece in pieces), 0.0
+    with Spool(path, pattern(sweep)) as spool:
+        for piece in pieces:
+            for fraction in _compute_piece(sweep, piece, spool, kept):
+                if progress is not None:
+                    progress((done + fraction * sum(piece.steps)) / total)
+            done += sum(piece.steps)
     return spool.cells
 
 
-def _compute_column(sweep: Sweep, column: Column, spool: Spool) -> None:
-    """Scan a column, and again where members do not agree, as often as the sweep asks."""
-    scanned: list[int] = []
-    passing = np.empty((len(sweep.criteria), 0))
-    due = sweep.scan(column)
-    for rounds in range(sweep.refine + 1):
-        if rounds:
-            due = sweep.finer(column, scanned, passing, rounds)
-        if not due:
-            return
-        shares = _compute_cells(sweep, column, due, spool)
-        order = np.argsort([*scanned, *due], kind="stable")
-        passing = np.concatenate([passing, shares], axis=1)[:, order]
-        scanned = [[*scanned, *due][index] for index in order]
-
-
-def _compute_cells(sweep: Sweep, column: Column, scan: Sequence[int], spool: Spool) -> npt.NDArray[np.float64]:
-    """Run all members at each number of steps, store them, and return the share that pass, shape (criterion, scan)."""
-    scene = sweep.scene_of(column)
+def _compute_piece(sweep: Sweep, piece: Piece, spool: Spool, kept: Kept | None) -> Iterator[float]:
+    """Store all members at each number of steps, computed where they are not kept; yield the fraction that is done."""
+    scene, scan = sweep.scene_of(piece.column), piece.steps
     first = spool.add_cells(len(scan))
-    spool.put(_cell_values(sweep, column, scan), slice(first, first + len(scan)))
-    failing = np.zeros((len(sweep.criteria), len(scan)))
+    spool.put(_cell_values(sweep, piece.column, scan), slice(first, first + len(scan)))
+    there = [kept is not None and kept.has(piece.column, steps) for steps in scan]
     launches = turned(scene, sweep.model, sweep.members)
     for start in range(0, sweep.members, BLOCK):
         block = slice(start, min(start + BLOCK, sweep.members))
         compared = None
-        if "trajectory" in sweep.criteria:
+        if "trajectory" in sweep.criteria and not all(there):
             distinct = launches[block] if sweep.model in TURNING else launches[:1]
             compared, _ = references(scene, sweep.model, distinct, sweep.horizon)
         for batch in range(0, len(scan), CHUNK_CELLS):
-            runs = [_run(sweep, scene, steps, launches, block, compared) for steps in scan[batch : batch + CHUNK_CELLS]]
+            runs = []
+            for steps, known in zip(scan[batch : batch + CHUNK_CELLS], there[batch:], strict=False):
+                if known and kept is not None:
+                    runs.append(kept.runs(piece.column, steps, block))
+                else:
+                    runs.append(_run_values(_run(sweep, scene, steps, launches, block, compared)))
             cells = slice(first + batch, first + batch + len(runs))
-            spool.put(_run_values(runs), cells, block)
-            for k, run in enumerate(runs):
-                failing[:, batch + k] += (~passes(sweep.criteria, run.measures)).sum(axis=-1)
-    return 1 - failing / sweep.members
+            spool.put({name: np.stack([run[name] for run in runs]) for name in runs[0]}, cells, block)
+            yield (start + (block.stop - start) * (batch + len(runs)) / len(scan)) / sweep.members
 
 
 def _run(
@@ -134,14 +136,13 @@ def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str,
     }
 
 
-def _run_values(runs: Sequence[Run]) -> dict[str, Any]:
-    """Return what is kept of the runs of some cells by name, shape (cell, member, ...)."""
-    measures = {name: np.stack([run.measures[name] for run in runs]) for name in runs[0].measures}
-    return measures | {name: np.stack([getattr(run, name) for run in runs]) for name in _OF_RUNS}
+def _run_values(run: Run) -> dict[str, Any]:
+    """Return what is kept of the runs of a cell by name, shape (member, ...)."""
+    return run.measures | {name: getattr(run, name) for name in _OF_RUNS}
 
 
-def _pattern(sweep: Sweep) -> xr.Dataset:
-    """Return an empty cell with all names, types, units and attributes of a shard."""
+def pattern(sweep: Sweep) -> xr.Dataset:
+    """Return one cell with all names, types, units and attributes of the sweep's shards, and no values of its own."""
     column = sweep.columns()[0]
     runs = layout.run_variables(sweep.members)
     member = np.arange(sweep.members, dtype=np.int32)
@@ -163,7 +164,7 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     code = "stiffdice.sweep", *simulators.code_of(sweep.simulator)
     attributes = layout.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
     attributes |= layout.simulator_attributes(sweep.simulator, simulators.version_of(sweep.simulator))
-    attributes |= layout.config_attributes("shard", sweep.config)
+    attributes |= layout.config_attributes("shard", sweep.of_runs)
     attributes["seed"] = sweep.seed
     attributes["model_reason"] = sweep.model_reason
     attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
@@ -180,28 +181,26 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
 AT_ONCE = 4 * CHUNK_CELLS
 
 
-def checked(parts: Iterable[xr.Dataset], sweep: Sweep, columns: Sequence[Column]) -> Iterator[xr.Dataset]:
-    """Pass a shard on, part by part, if it is the one that `compute` would make of these columns now.
+def checked(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
+    """Pass a shard on, part by part, if it is the one that `compute` would make of these pieces now.
 
     Raises RefusedError, naming what is other than planned: attributes (code and scene among them), variables, members,
-    columns, or the steps that are scanned first.
+    or cells.
     """
-    pattern = _pattern(sweep)
-    missing = {(list(LAWS).index(column.contact), column.stiffness): set(sweep.scan(column)) for column in columns}
+    like = pattern(sweep)
+    cells = ((list(LAWS).index(column.contact), column.stiffness, n) for column, steps in pieces for n in steps)
     for part in parts:
-        _check_like(part, pattern)
-        for contact, stiffness, steps in zip(
-            part.contact.values, part.stiffness.values, part.steps.values, strict=True
-        ):
-            if (contact, stiffness) not in missing:
-                raise RefusedError(f"not the shard planned: has other columns, of stiffness = {stiffness:g}")
-            missing[contact, stiffness].discard(steps)
+        check_like(part, like)
+        there = zip(*(part[name].values.tolist() for name in CELL), strict=True)
+        for cell in there:
+            if cell != next(cells, None):
+                raise RefusedError(f"not the shard planned: has another cell, of stiffness = {cell[1]:g}")
         yield part
-    if any(missing.values()):
+    if next(cells, None) is not None:
         raise RefusedError("not the shard planned: cells are missing")
 
 
-def _check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
+def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
     """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
     ours, theirs = pattern.attrs, part.attrs
     if other := [key for key in ours | theirs if str(ours.get(key)) != str(theirs.get(key))]:
@@ -214,12 +213,14 @@ def _check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
         raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")
 
 
-def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.Dataset:
+def collect(
+    parts: Iterable[xr.Dataset], tolerances: Mapping[str, float], config: Mapping[str, Any] | None = None
+) -> xr.Dataset:
     """Return all cells of all shards, judged: how many members fail each criterion, and the worst of each measure.
 
-    parts: shards, or AT_ONCE cells of one at a time (`io.read.parts`): what is in memory then does not grow with them.
-    Cells are sorted by contact law, stiffness and steps. Raises InputError if the shards were not made from the same
-    scene by the same code.
+    parts: shards, or AT_ONCE cells of one at a time (`io.read.parts`): what is in memory then does not grow with their
+    runs. config: what was asked of the whole; None leaves what was asked of each run. Cells are sorted by contact law,
+    stiffness and steps. Raises InputError if the shards were not made from the same scene by the same code.
     """
     judged: list[xr.Dataset] = []
     cells: list[bytes] = []
@@ -234,8 +235,8 @@ def collect(parts: Iterable[xr.Dataset], tolerances: Mapping[str, float]) -> xr.
     order = np.lexsort([whole[key].values for key in ("steps", "stiffness", "contact")])
     whole = whole.isel(cell=order)
     whole.attrs = judged[0].attrs | {
+        **(layout.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}),
         "title": "Sweep of stiffness and steps",
-        "kind": "sweep",
         "runs_digest": digest_of_cells(cells),
         "judging_code_digest": code_digest("stiffdice.sweep"),
     }

@@ -7,8 +7,9 @@ import shutil
 from pathlib import Path
 
 import yaml
+from tests import rounds
 
-from stiffdice import figures, frontier, results, study, sweep
+from stiffdice import figures, frontier, results, shards, study, sweep
 from stiffdice import scene as scenes
 from stiffdice.catalogue import TABLES
 from stiffdice.io.layout import run_dataset
@@ -17,6 +18,14 @@ from stiffdice.io.write import write_bytes, write_dataset
 from stiffdice.simulate import simulate
 
 ROOT = Path(__file__).parent.parent.parent
+SWEEP = {
+    "scene": "config/scenes/figure-13.yaml",
+    "model": "sliding",
+    "contact": ["ungated"],
+    "stiffness": {"from": 1e3, "to": 1e4, "count": 3},
+    "omega_h": {"from": 3.0, "to": 0.5, "count": 5},
+    "members": 4,
+}
 TINY = {
     "question": "Is <all> of it packed?",
     "runs": {
@@ -29,15 +38,7 @@ TINY = {
         }
     },
     "sweeps": {
-        "steps": {
-            "scene": "my-scene.yaml",
-            "model": "sliding",
-            "contact": ["ungated"],
-            "stiffness": {"from": 1e3, "to": 1e4, "count": 3},
-            "omega_h": {"from": 3.0, "to": 0.5, "count": 5},
-            "members": 4,
-            "columns_per_shard": 2,
-        }
+        "steps": {**rounds.asked_in_parts(SWEEP, 2), "scene": "my-scene.yaml"},
     },
     "figures": {"position": {"draw": "position", "run": "fall", "title": "Position & place"}},
     "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
@@ -85,10 +86,10 @@ def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
             write_dataset(run_dataset(simulate(given, model=run.model, steps=run.steps, every=run.every)), first)
         elif result.stage == "shard":
             asked = planned.sweeps["steps"]
-            sweep.compute(asked, asked.shards()[first.stem], first)
+            sweep.compute(asked, shards.of(asked)[first.stem].pieces, first)
         elif result.stage == "collect":
-            shards = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path, sweep.AT_ONCE))
-            write_dataset(sweep.collect(shards, planned.sweeps["steps"].criteria), first)
+            runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path, sweep.AT_ONCE))
+            write_dataset(sweep.collect(runs, planned.sweeps["steps"].criteria), first)
             write_bytes(b"shard,cells\n", top / result.files[1])
         elif result.stage == "frontier":
             found = frontier.find(open_file(top / "sweeps/steps/sweep.h5"))

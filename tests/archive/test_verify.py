@@ -8,6 +8,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from tests import rounds
 
 from stiffdice import frontier, sweep
 from stiffdice.archive import manifest
@@ -57,11 +58,9 @@ def made(plan, tmp_path_factory):
     (folder / "results/tiny/runs").mkdir()
     write_dataset(run_dataset(simulate(SCENE, model="sliding", steps=500, every=1)), folder / RUN)
     spans = {"stiffness": {"from": 1e2, "to": 1e4, "count": 3}, "omega_h": {"from": 2.5, "to": 0.3, "count": 4}}
-    small = dataclasses.replace(plan, **spans, members=4, refine=0, columns_per_shard=3)
-    paths = [folder / SWEEP / "shards" / f"{name}.h5" for name in small.shards()]
-    for path, columns in zip(paths, small.shards().values(), strict=True):
-        sweep.compute(small, columns, path)
-    (folder / SWEEP / "shards.csv").write_text("".join(f"{n},x\n" for n in ["shard", *small.shards()]))
+    small = rounds.in_parts(dataclasses.replace(plan, **spans, members=4, refine=0), 2)
+    paths = rounds.compute(small, folder / SWEEP / "shards")
+    (folder / SWEEP / "shards.csv").write_text("".join(f"{n},x\n" for n in ["shard", *(p.stem for p in paths)]))
     collected = sweep.collect((part for path in paths for part in parts(path, 64)), small.criteria)
     write_dataset(collected, folder / SWEEP / "sweep.h5")
     write_dataset(frontier.find(collected), folder / SWEEP / "frontier.h5")

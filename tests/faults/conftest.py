@@ -13,21 +13,24 @@ from pathlib import Path
 
 import pytest
 import yaml
+from tests import rounds
 
 ROOT = Path(__file__).parent.parent.parent
 SMALL = {
     "question": "Is anything lost?",
     "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 100}},
     "sweeps": {
-        "steps": {
-            "scene": "config/scenes/figure-13.yaml",
-            "model": "sliding",
-            "contact": ["ungated", "gated"],
-            "stiffness": {"from": 1e3, "to": 1e4, "count": 2},
-            "omega_h": {"from": 3.0, "to": 0.5, "count": 4},
-            "members": 2,
-            "columns_per_shard": 1,
-        },
+        "steps": rounds.asked_in_parts(
+            {
+                "scene": "config/scenes/figure-13.yaml",
+                "model": "sliding",
+                "contact": ["ungated", "gated"],
+                "stiffness": {"from": 1e3, "to": 1e4, "count": 2},
+                "omega_h": {"from": 3.0, "to": 0.5, "count": 4},
+                "members": 2,
+            },
+            4,
+        ),
     },
     "experiments": {
         "books": {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}}

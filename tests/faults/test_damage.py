@@ -7,9 +7,10 @@ import shutil
 import pytest
 import xarray as xr
 
+from stiffdice import shards as dealing
 from stiffdice import sweep
 from stiffdice.errors import RefusedError
-from stiffdice.grid import Column
+from stiffdice.grid import Column, Piece
 from stiffdice.io.read import parts
 from stiffdice.io.write import write_dataset
 
@@ -41,7 +42,7 @@ def is_as_undisturbed(project, undisturbed, *aside):
 def test_what_was_damaged_is_named_and_made_again(undisturbed, tmp_path):
     """All shards, each in its own way, and an experiment, in one go."""
     project = undisturbed.copy(tmp_path / "project")
-    flipped, swapped, text, emptied = shards_of(project)
+    flipped, swapped, text, emptied, *_ = shards_of(project)
     flip(flipped)
     shutil.copy(flipped.with_name(text.name), swapped)
     text.write_text("stiffness: 1000\n")
@@ -52,7 +53,7 @@ def test_what_was_damaged_is_named_and_made_again(undisturbed, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     told = {
         flipped: "damaged: its content is not what was sealed",
-        swapped: "not the shard planned: has other columns",
+        swapped: "not the shard planned: has another cell",
         text: "not a readable HDF5 file",
         emptied: "not a readable HDF5 file",
         books: "damaged: has no seal at its end",
@@ -111,18 +112,18 @@ def test_a_shard_of_other_code_does_not_pass_for_ours_when_snakemake_forgot(undi
 
 @pytest.fixture(scope="module")
 def shard(plan, shards):
-    """A shard of config/quick.yaml: its file, and the columns that are planned to be in it."""
+    """A shard of config/quick.yaml: its file, and the cells that are planned to be in it."""
     (path, *_) = shards
-    return path, plan.shards()[path.stem]
+    return path, dealing.of(plan)[path.stem].pieces
 
 
-def read(shard, plan, columns, change=lambda part: part):
-    return list(sweep.checked((change(part) for part in parts(shard, 7)), plan, columns))
+def read(shard, plan, pieces, change=lambda part: part):
+    return list(sweep.checked((change(part) for part in parts(shard, 7)), plan, pieces))
 
 
 def test_the_shard_planned_is_passed_on_as_it_is(plan, shard):
-    path, columns = shard
-    for passed, part in zip(read(path, plan, columns), parts(path, 7), strict=True):
+    path, pieces = shard
+    for passed, part in zip(read(path, plan, pieces), parts(path, 7), strict=True):
         xr.testing.assert_identical(passed, part)
 
 
@@ -135,20 +136,20 @@ def test_the_shard_planned_is_passed_on_as_it_is(plan, shard):
         (lambda part: part.isel(member=slice(1, None)), "members, not"),
         (lambda part: part.drop_vars("decided"), "other variable decided"),
         (lambda part: part.assign(verdict=part.verdict.astype("i4")), "other variable verdict"),
-        (lambda part: part.assign_coords(stiffness=part.stiffness * 2), "has other columns"),
-        (lambda part: part.assign_coords(contact=1 - part.contact), "has other columns"),
-        (lambda part: part.isel(cell=slice(1, None)), "cells are missing"),
+        (lambda part: part.assign_coords(stiffness=part.stiffness * 2), "has another cell"),
+        (lambda part: part.assign_coords(contact=1 - part.contact), "has another cell"),
+        (lambda part: part.isel(cell=slice(1, None)), "has another cell"),
     ],
 )
 def test_another_shard_is_refused_with_what_is_other(plan, shard, change, told):
-    path, columns = shard
+    path, pieces = shard
     with pytest.raises(RefusedError, match=f"not the shard planned: .*{told}"):
-        read(path, plan, columns, change)
+        read(path, plan, pieces, change)
 
 
-def test_a_shard_of_fewer_or_more_columns_is_refused(plan, shard):
-    path, columns = shard
-    with pytest.raises(RefusedError, match="has other columns"):
-        read(path, plan, columns[:-1])
+def test_a_shard_of_fewer_or_more_cells_is_refused(plan, shard):
+    path, pieces = shard
+    with pytest.raises(RefusedError, match="has another cell"):
+        read(path, plan, pieces[:-1])
     with pytest.raises(RefusedError, match="cells are missing"):
-        read(path, plan, [*columns, Column("gated", 1.25)])
+        read(path, plan, [*pieces, Piece(Column("gated", 1.25), (100,))])

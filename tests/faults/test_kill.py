@@ -128,7 +128,7 @@ import json, os, signal, sys, time
 from pathlib import Path
 import numpy as np, xarray as xr
 from stiffdice import scene, sweep
-from stiffdice.grid import Sweep
+from stiffdice.grid import Piece, Sweep
 from stiffdice.io import seal
 from stiffdice.io.spool import Spool
 from stiffdice.io.write import write_bytes, write_dataset
@@ -156,9 +156,9 @@ def by_shard(k, path):
     plan = Sweep(
         scene.load("config/scenes/figure-13.yaml"), "sliding", "symplectic_euler", ("gated",),
         {"from": 1e2, "to": 1e3, "count": 2}, None, {"from": 3.0, "to": 1.0, "count": 4}, 2, k, 0, {"energy": 0.1},
-        True, 1.0, 2,
+        True, 1.0,
     )
-    sweep.compute(plan, plan.columns(), path)
+    sweep.compute(plan, [Piece(column, tuple(plan.scan(column))) for column in plan.columns()], path)
 
 write = globals()["by_" + WHAT]
 target = Path("target.h5")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
+from tests import rounds
 
 from stiffdice import catalogue, figures, frontier, sweep, theory
 from stiffdice.experiments import bounce_map
@@ -31,10 +32,9 @@ def swept(folder, damping, contact, stiffness, steps, omega_h, criteria):
         criteria=criteria,
         early_stop=True,
         horizon=10.0,
-        columns_per_shard=100,
     )
     path = folder / f"{damping}-{'-'.join(contact)}.h5"
-    sweep.compute(plan, plan.columns(), path)
+    sweep.compute(plan, rounds.scan(plan), path)
     with xr.open_dataset(path, engine="h5netcdf") as shard:
         return frontier.find(sweep.collect([shard], plan.criteria))
 

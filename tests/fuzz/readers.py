@@ -113,6 +113,7 @@ MOST_COLUMNS = 200  # looked at, of a sweep that may have a million
 
 def sound_sweep(sweep: object) -> None:
     """State what holds of every sweep."""
+    from stiffdice import shards
     from stiffdice.grid import Sweep
 
     assert isinstance(sweep, Sweep)
@@ -120,8 +121,10 @@ def sound_sweep(sweep: object) -> None:
     assert len(set(columns)) == len(columns) > 0
     sound_scene(sweep.scene_of(columns[0]))
     if len(columns) <= MOST_COLUMNS:
-        dealt = [column for part in sweep.shards().values() for column in part]
-        assert sorted(dealt) == sorted(columns)
+        dealt = [
+            (piece.column, n) for shard in shards.of(sweep).values() for piece in shard.pieces for n in piece.steps
+        ]
+        assert sorted(dealt) == sorted((column, n) for column in columns for n in sweep.scan(column))
     for column in columns[:3]:
         steps = sweep.scan(column)
         low, high = sweep.step_range(column.stiffness)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from tests import rounds
 
-from stiffdice import sweep
 from stiffdice.io import digest
 from stiffdice.io.digest import data_digest, runs_digest
 from stiffdice.io.layout import run_dataset
@@ -141,14 +140,7 @@ def test_text_has_a_digest_and_what_no_file_of_ours_holds_is_refused():
 @pytest.fixture(scope="module")
 def dealt(small, tmp_path_factory):
     """Its shards, one column in each, and four; by columns in each."""
-    found = {}
-    for size in (1, 4):
-        folder = tmp_path_factory.mktemp(f"by-{size}")
-        plan = dataclasses.replace(small, columns_per_shard=size)
-        for name, columns in plan.shards().items():
-            sweep.compute(plan, columns, folder / f"{name}.h5")
-        found[size] = sorted(folder.iterdir())
-    return found
+    return {size: rounds.by_columns(small, size, tmp_path_factory.mktemp(f"by-{size}")) for size in (1, 4)}
 
 
 @pytest.fixture(scope="module")

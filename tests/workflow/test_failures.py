@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests import rounds
 from tests.workflow.test_workflow import Project, planned
 
-from stiffdice import results, sweep
+from stiffdice import results, shards
 
 GRID = {
     "scene": "config/scenes/figure-13.yaml",
@@ -20,8 +21,8 @@ GRID = {
     "omega_h": {"from": 3.0, "to": 0.5, "count": 12},
     "members": 500,
 }
-# Two shards: one of two columns, which is the larger file, and one of one.
-LARGE = {**GRID, "stiffness": {"from": 1e3, "to": 1e5, "count": 3}, "columns_per_shard": 2}
+# Two shards: one of two thirds of the work, which is the larger file, and one of the rest.
+LARGE = rounds.asked_in_parts({**GRID, "stiffness": {"from": 1e3, "to": 1e5, "count": 3}}, 1.4)
 STUDY = {
     "question": "What if some of it fails?",
     "sweeps": {"large": LARGE, "small": {**GRID, "stiffness": 1e3, "members": 4}},
@@ -60,9 +61,7 @@ def failed(tmp_path_factory):
     project = Project(tmp_path_factory.mktemp("failed"))
     project.plan(STUDY)
     plan, sizes = planned(project).sweeps["large"], []
-    for columns in plan.shards().values():
-        path = tmp_path_factory.mktemp("sizes") / "shard.h5"
-        sweep.compute(plan, columns, path)
+    for path in rounds.compute(plan, tmp_path_factory.mktemp("sizes")):
         sizes.append(path.stat().st_size)
     large, small = sizes
     assert large > 1.5 * small
@@ -70,8 +69,12 @@ def failed(tmp_path_factory):
     return project, make(project, (large + small) // 2)
 
 
+def shards_of_large(project: Project) -> dict[str, shards.Shard]:
+    return shards.of(planned(project).sweeps["large"])
+
+
 def large_shards(project: Project) -> tuple[str, str]:
-    first, second = planned(project).sweeps["large"].shards()
+    first, second = shards_of_large(project)
     return first, second
 
 
@@ -82,7 +85,7 @@ def test_the_rest_goes_on(failed):
     made = {file for result in results.of(planned(project)) for file in result.files if (top / file).exists()}
     assert made == {
         f"sweeps/large/shards/{second}.h5",
-        *(f"sweeps/small/shards/{shard}.h5" for shard in planned(project).sweeps["small"].shards()),
+        *(f"sweeps/small/shards/{shard}.h5" for shard in shards.of(planned(project).sweeps["small"])),
         *("sweeps/small/sweep.h5", "sweeps/small/shards.csv"),
     }
     assert not list(top.rglob("*.part"))
@@ -117,8 +120,9 @@ def test_status_says_so_too(failed):
     assert data["not_made"] == ["collect large", "frontier large", "figure frontier"]
     (reason,) = (job["reason"] for job in data["jobs"] if job["state"] == "failed")
     assert "File too large" in reason
+    lost, made = (sum(len(piece.steps) for piece in shard.pieces) for shard in shards_of_large(project).values())
     assert data["cells"]["large"] == {
-        **{"planned": 36, "at_least": False, "done": 12, "running": 0, "failed": 24, "runs": 12 * 500},
+        **{"planned": 36, "at_least": False, "done": made, "running": 0, "failed": lost, "runs": made * 500},
     }
 
 

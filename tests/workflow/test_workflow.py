@@ -17,9 +17,10 @@ import pytest
 import xarray as xr
 import yaml
 from PIL import Image
+from tests import rounds
 
+from stiffdice import shards, sweep
 from stiffdice import study as studies
-from stiffdice import sweep
 from stiffdice.io import FORMAT_VERSION
 from stiffdice.io.read import open_file, parts
 from stiffdice.scene import load
@@ -40,7 +41,6 @@ TINY = {
             "omega_h": {"from": 3.0, "to": 0.3, "count": 12},
             "members": 4,
             "early_stop": False,
-            "columns_per_shard": 2,
         },
     },
     "experiments": {
@@ -59,7 +59,7 @@ TINY = {
 # What two rebuilds share: all but times, and the figures that show them.
 DATA = ("runs/*.h5", "sweeps/**/*.h5", "sweeps/**/*.csv", "experiments/*.h5", "tables/*", "figures/[!t]*")
 # What is due when all runs of the sweep are.
-AGAIN = {"shard": 3, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
+AGAIN = {"shard": 2, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
 pytestmark = pytest.mark.workflow
 
 
@@ -152,7 +152,7 @@ def test_all_files_are_there_and_open(finished):
             assert min(image.size) > 300
         assert "<svg" in (top / "figures" / f"{name}.svg").read_text()
     hdf5 = sorted(top.rglob("*.h5"))
-    assert len(hdf5) == 2 + 3 + 2 + 2 + 1  # runs, shards, sweep and frontier, experiments, timing
+    assert len(hdf5) == 2 + 2 + 2 + 2 + 1  # runs, shards, sweep and frontier, experiments, timing
     for path in hdf5:
         with xr.open_dataset(path) as found:
             assert found.attrs["format_version"] == FORMAT_VERSION
@@ -171,8 +171,8 @@ def test_a_stored_run_is_what_the_simulator_says(finished, preset):
 
 def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished, tmp_path):
     plan = planned(finished).sweeps["steps"]
-    sweep.compute(plan, plan.columns(), tmp_path / "whole.h5")
-    whole = sweep.collect(parts(tmp_path / "whole.h5", 10), plan.criteria)
+    sweep.compute(plan, rounds.scan(plan), tmp_path / "whole.h5")
+    whole = sweep.collect(parts(tmp_path / "whole.h5", 10), plan.criteria, plan.config)
     xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweeps/steps/sweep.h5"), whole)
 
 
@@ -190,7 +190,7 @@ def test_a_table_maps_the_shards_names_back(finished):
     with (finished.folder / "results/tiny/sweeps/steps/shards.csv").open() as file:
         rows = list(csv.DictReader(file))
     plan = planned(finished).sweeps["steps"]
-    assert {row["shard"] for row in rows} == set(plan.shards())
+    assert {row["shard"] for row in rows} == set(shards.of(plan))
     assert sum(int(row["cells"]) for row in rows) == sum(len(plan.scan(column)) for column in plan.columns())
 
 
@@ -210,7 +210,7 @@ def test_a_changed_style_redraws_only(finished, edited):
 
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     edited("src/stiffdice/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
-    runs = {"shard": 3, "trajectory": 2, "experiment": 2, "timing": 1}
+    runs = {"shard": 2, "trajectory": 2, "experiment": 2, "timing": 1}
     everything = runs | {"collect": 1, "frontier": 1, "figure": 4, "table": 1}
     assert finished.jobs_due() == everything
 
@@ -369,7 +369,7 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
 @pytest.mark.long
 def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other = Project(tmp_path)
-    other.plan({**TINY, "sweeps": {"steps": {**TINY["sweeps"]["steps"], "columns_per_shard": 1}}})
+    other.plan({**TINY, "sweeps": {"steps": rounds.asked_in_parts(TINY["sweeps"]["steps"], 5)}})
     done = other.snakemake("--cores", "1")
     assert done.returncode == 0, done.stderr
     data = ("sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "runs/*.h5", "experiments/*", "figures/[!t]*")

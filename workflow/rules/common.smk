@@ -1,11 +1,12 @@
 # What the rules share: studies, read and checked once, and the paths that follow from them.
 
 import hashlib
+import math
 import sys
 from functools import cache
 from pathlib import Path
 
-from stiffdice import results, runners, simulators
+from stiffdice import results, runners, shards, simulators
 from stiffdice import study as studies
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.errors import InputError
@@ -21,6 +22,7 @@ wildcard_constraints:
     preset="as_listed|as_written|corrected",
     shard="[0-9a-f]{12}",
     sweep="[a-z0-9][a-z0-9-]*",
+    round="[0-9]+",
     experiment="[a-z0-9][a-z0-9-]*",
     timing="[a-z0-9][a-z0-9-]*",
     table="[a-z0-9][a-z0-9-]*",
@@ -86,8 +88,30 @@ def planned_table(wildcards):
 
 @cache
 def shards_of(name, sweep):
-    """Return the columns of each shard of a sweep, by the shard's id."""
-    return study(name).sweeps[sweep].shards()
+    """Return the shards of a sweep, by their ids."""
+    return shards.of(study(name).sweeps[sweep])
+
+
+def shard_of(wildcards):
+    return shards_of(wildcards.study, wildcards.sweep)[wildcards.shard]
+
+
+def minutes_of(shard):
+    """Return how long a shard may take: machines are slower than the one that predictions are for, and compile first."""
+    return 10 + 4 * math.ceil(shard.seconds / 60)
+
+
+def shard_files(wildcards, rounds):
+    """Return the shards of the first so many rounds of a sweep."""
+    top = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/shards"
+    plan = shards_of(wildcards.study, wildcards.sweep)
+    return [f"{top}/{shard}.h5" for number in range(rounds) for shard in shards.rounds(plan, number)]
+
+
+def survey_files(wildcards, rounds):
+    """Return the surveys that say where the cells of the first so many rounds lie; the first needs none."""
+    top = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/surveys"
+    return [f"{top}/{number}.h5" for number in range(rounds - 1)]
 
 
 # Where the files of each kind are. Times are apart, with the other files that no two rebuilds share.

@@ -1,14 +1,15 @@
 # A grid of stiffness and steps: shards of many runs, collected and judged, and searched for the edges of stability.
 
 
-# A shard's name is a digest of its scene and columns, so it needs no input file: another scene is another shard.
+# A shard's name is a digest of what it holds or, in a later round, of what that follows from. So a survey need only be
+# there: one that is made once more says the same.
 rule shard:
+    input:
+        survey=lambda wildcards: ancient(survey_files(wildcards, shard_of(wildcards).round + 1)[-1:]),
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
-        # Snakemake compares plain data only; that `sweep` changed it learns from the shard's name.
-        sweep=lambda wildcards: planned_sweep(wildcards),
-        columns=lambda wildcards: shards_of(wildcards.study, wildcards.sweep)[wildcards.shard],
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; the name says what changed
         code=lambda wildcards: code_of_runs("shard.py", planned_sweep(wildcards).simulator, "stiffdice.sweep"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
@@ -17,25 +18,49 @@ rule shard:
     priority: 10
     resources:
         mem_mb=growing(700),
-        runtime=growing(30),
+        runtime=lambda wildcards, attempt: minutes_of(shard_of(wildcards)) * 2 ** (attempt - 1),
     conda:
         "../envs/stiffdice.yaml"
     script:
         "../scripts/shard.py"
 
 
+# What the rounds up to one of them found, from which the next one's cells follow.
+rule survey:
+    input:
+        shards=lambda wildcards: shard_files(wildcards, int(wildcards.round) + 1),
+        surveys=lambda wildcards: survey_files(wildcards, int(wildcards.round) + 1),
+    output:
+        sweep="results/{study}/sweeps/{sweep}/surveys/{round}.h5",
+    params:
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared
+        tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
+        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.shards", "stiffdice.io.read", "stiffdice.io.write"),
+    log:
+        "results/{study}/logs/survey/{sweep}/{round}.log",
+    benchmark:
+        "results/{study}/benchmarks/survey/{sweep}/{round}.tsv"
+    priority: 10
+    resources:
+        mem_mb=growing(1000),
+        runtime=growing(10),
+    conda:
+        "../envs/stiffdice.yaml"
+    script:
+        "../scripts/collect.py"
+
+
 rule collect:
     input:
-        lambda wildcards: expand(
-            "results/{{study}}/sweeps/{{sweep}}/shards/{shard}.h5", shard=shards_of(wildcards.study, wildcards.sweep)
-        ),
+        shards=lambda wildcards: shard_files(wildcards, planned_sweep(wildcards).refine + 1),
+        surveys=lambda wildcards: survey_files(wildcards, planned_sweep(wildcards).refine + 1),
     output:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
         sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared
         tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
-        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.io.read", "stiffdice.io.write"),
+        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.shards", "stiffdice.io.read", "stiffdice.io.write"),
     log:
         "results/{study}/logs/collect/{sweep}.log",
     benchmark:

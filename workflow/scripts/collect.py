@@ -1,45 +1,55 @@
-"""Collect shards into one sweep of judged cells, with a table that says what is in which."""
+"""Collect shards into one sweep of judged cells, with a table that says what is in which; or those of some rounds."""
 
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
-from inputs import Inputs, Say
+from inputs import Inputs, Say, opened
 from job import logged
 
-from stiffdice import sweep
+from stiffdice import shards, sweep
 from stiffdice.io.read import parts
 from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
-lines = ["shard,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
+lines = ["shard,round,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
 
 
-def shards(say: Say) -> Iterator[xr.Dataset]:
+def row(name: str, number: int, members: int, stiffness: list[float], steps: list[int]) -> str:
+    """Return what is in a shard as a line; a later round's may be empty."""
+    spans = [f"{edge:g}" for edge in (min(stiffness), max(stiffness))] if steps else ["", ""]
+    spans += [str(edge) for edge in (min(steps), max(steps))] if steps else ["", ""]
+    return ",".join([name, str(number), str(len(steps)), str(members), *spans])
+
+
+def checked(say: Say) -> Iterator[xr.Dataset]:
     """Read one shard after another, part by part, and note what is in it; one that is not as planned is refused."""
-    plan = snakemake.params.sweep
-    planned, inputs = plan.shards(), Inputs(say)
-    for path in snakemake.input:
+    asked = snakemake.params.sweep
+    plan, inputs = shards.of(asked), Inputs(say)
+    surveys = opened(((Path(path).stem, path) for path in snakemake.input.surveys), say)
+    later = {
+        int(number) + 1: shards.later(asked, survey, int(number) + 1, len(shards.rounds(plan, int(number) + 1)))
+        for number, survey in surveys.items()
+    }
+    for path in snakemake.input.shards:
+        shard = plan[Path(path).stem]
+        pieces = later[shard.round][shard.part] if shard.round else shard.pieces
         with inputs.reading(path):
-            stiffness, steps, members = [], [], 0
-            for part in sweep.checked(parts(path, sweep.AT_ONCE), plan, planned[Path(path).stem]):
-                stiffness.append(part.stiffness.values)
-                steps.append(part.steps.values)
-                members = part.sizes["member"]
+            stiffness, steps = [], []
+            for part in sweep.checked(parts(path, sweep.AT_ONCE), asked, pieces):
+                stiffness += part.stiffness.values.tolist()
+                steps += part.steps.values.tolist()
                 if inputs.whole:
                     yield part
-            softest_to_hardest, fewest_to_most = np.sort(np.concatenate(stiffness)), np.sort(np.concatenate(steps))
-            lines.append(
-                f"{Path(path).stem},{len(fewest_to_most)},{members},{softest_to_hardest[0]:g},"
-                f"{softest_to_hardest[-1]:g},{fewest_to_most[0]},{fewest_to_most[-1]}"
-            )
+            lines.append(row(Path(path).stem, shard.round, asked.members, stiffness, steps))
     inputs.check()
 
 
 with logged() as say:
-    write_dataset(sweep.collect(shards(say), snakemake.params.tolerances), snakemake.output.sweep)
-    write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)
+    found = sweep.collect(checked(say), snakemake.params.tolerances, snakemake.params.sweep.config)
+    write_dataset(found, snakemake.output.sweep)
+    if snakemake.rule == "collect":
+        write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)
     say(f"{len(lines) - 1} shards collected")

@@ -15,7 +15,7 @@ from stiffdice.io.read import open_file
 Say = Callable[[str], None]
 
 # What is found where, as its file says itself.
-_KINDS = {"runs": "run", "experiments": "experiment", "timings": "timing"}
+_KINDS = {"runs": "run", "surveys": "sweep", "experiments": "experiment", "timings": "timing"}
 
 
 class Inputs:

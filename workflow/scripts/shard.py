@@ -1,16 +1,28 @@
-"""Compute the columns of one shard and store their runs."""
+"""Compute one shard and store its runs."""
 
+from pathlib import Path
 from typing import Any
 
+from inputs import opened
 from job import Stopwatch, logged, tenths
 
-from stiffdice import job_log, sweep
+from stiffdice import job_log, shards, sweep
+from stiffdice.kept import Kept
 
 snakemake: Any  # Snakemake puts it here
 
 with logged() as say:
-    planned, watch = snakemake.params.sweep, Stopwatch()
+    planned, target = snakemake.params.sweep, Path(snakemake.output[0])
+    plan = shards.of(planned)
+    number, part, parts, _, pieces = plan[target.stem]
+    if number:
+        survey = opened([("survey", snakemake.input[0])], say)["survey"]
+        pieces = shards.later(planned, survey, number, parts)[part]
+    kept = Kept(planned, pieces, target.parent, plan, say)
+    watch = Stopwatch()
     with watch.running():
-        cells = sweep.compute(planned, snakemake.params.columns, snakemake.output[0], tenths(say))
+        cells = sweep.compute(planned, pieces, target, tenths(say), kept)
     say(job_log.cells(cells, planned.members))
+    if kept:
+        say(f"of these, {len(kept)} cells kept from shards of an earlier plan")
     say(f"simulation: {watch.seconds:.3f} s")

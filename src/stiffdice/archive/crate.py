@@ -126,6 +126,9 @@ def describe(result: Result, suffix: str, study: Study) -> str:
     """Return in one line what a file of a result is."""
     if result.stage == "shard":
         return f"Every run of some cells of the sweep {result.name.split('/')[0]}"
+    if result.stage == "survey":
+        sweep, _, number = result.name.partition("/")
+        return f"Cells of the sweep {sweep} up to round {number}, judged: where the next round's lie"
     if result.stage == "collect":
         return f"{'Which shard holds what' if suffix == '.csv' else 'All cells, judged'}, of the sweep {result.name}"
     if result.stage in {"figure", "animation"}:

@@ -22,9 +22,9 @@ sweeps:
     model: sliding
     contact: [gated]
     stiffness: {{from: 1.0e2, to: 1.0e3, count: {count}}}
-    omega_h: {{from: 1.0, to: 0.9, count: 2}}
+    omega_h: {{from: 1.0, to: 0.9, count: 1}}
     members: 1
-    columns_per_shard: 1
+    seconds_per_job: 1.0e-9
 """
 TARGET = "results/cost/sweeps/cells/sweep.h5"
 

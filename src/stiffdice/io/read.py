@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import values
 from stiffdice.io.checked import opened, told
+from stiffdice.io.digest import Plain, plain
 from stiffdice.io.structure import Contents
 
 
@@ -42,6 +45,23 @@ def parts(path: str | Path, cells: int) -> Iterator[xr.Dataset]:
             with told(path):
                 part = _checked(dataset.isel(cell=slice(first, first + cells)).load(), contents)
             yield part
+
+
+def head(path: str | Path, names: Sequence[str]) -> tuple[dict[str, Plain], dict[str, npt.NDArray[Any]]]:
+    """Return the attributes of a file of ours, and some of its variables; raises InputError as `open_file` does."""
+    with told(path), opened(path) as (file, contents):
+        found = {name: file[name][...] for name in names}
+        for name, array in found.items():
+            values.check(contents, name, array)
+        return {name: plain(value) for name, value in file.attrs.items() if not name.startswith("_")}, found
+
+
+def some(path: str | Path, cells: Sequence[int], members: slice) -> xr.Dataset:
+    """Return some members in some cells of a file of runs, loaded; raises InputError as `open_file` does."""
+    with told(path):
+        contents = _contents(path)
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as dataset:
+            return _checked(dataset.isel(cell=list(cells), member=members).load(), contents)
 
 
 def _memory() -> float:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -129,29 +132,32 @@ _FIT_ROUNDING = 100 * 20 * 2 * ROUNDING
 
 # What a file and the one that it is made from say alike.
 _SHARED = (
-    *(
-        "scene_digest",
-        "config_digest",
-        "model",
-        "scheme",
-        "simulator",
-        "simulator_version",
-        "code_digest",
-        "early_stop",
-    ),
+    *("scene_digest", "model", "scheme", "simulator", "simulator_version", "code_digest", "early_stop"),
     *("members", "runs_digest"),
 )
 
 
 def same_as_collected(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
     """Return a line for all that a sweep says otherwise than its shards, which it does to the last bit."""
-    return _attributes(dataset, again, "its shards") + _differences(dataset, again, {})
+    return (
+        _attributes(dataset, again, "its shards", _SHARED) + _config(dataset, again) + _differences(dataset, again, {})
+    )
 
 
-def _attributes(dataset: xr.Dataset, other: xr.Dataset, whose: str) -> list[str]:
+def _config(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
+    """Return a line for all that was asked of the runs otherwise than of the sweep, which asks more."""
+    whole, runs = (json.loads(str(found.attrs.get("config", "{}"))) for found in (dataset, again))
+    return [
+        f"config.{key} = {whole.get(key)}: allowed is {value}, that of its shards"
+        for key, value in runs.items()
+        if whole.get(key) != value
+    ]
+
+
+def _attributes(dataset: xr.Dataset, other: xr.Dataset, whose: str, names: Sequence[str]) -> list[str]:
     return [
         f"{name} = {dataset.attrs.get(name)}: allowed is {other.attrs.get(name)}, that of {whose}"
-        for name in _SHARED
+        for name in names
         if str(dataset.attrs.get(name)) != str(other.attrs.get(name))
     ]
 
@@ -168,7 +174,8 @@ def same_as_found(dataset: xr.Dataset, collected: xr.Dataset) -> list[str]:
         rooms[name] = np.log(10) * _FIT_ROUNDING * np.abs(again[name].values)
     for name in ("limit", "pass_fraction_low", "pass_fraction_high"):
         rooms[name] = 16 * ROUNDING * np.abs(again[name].values) + 4 * ROUNDING
-    return _attributes(dataset, collected, "its sweep") + _differences(dataset, again, rooms)
+    shared = (*_SHARED, "config_digest")
+    return _attributes(dataset, collected, "its sweep", shared) + _differences(dataset, again, rooms)
 
 
 def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: dict[str, npt.ArrayLike]) -> list[str]:

@@ -1,0 +1,90 @@
+"""Runs that are there already: those in shards that an earlier plan of the same sweep left beside the ones planned now.
+
+A grid that is extended, made denser or dealt otherwise has other shards, but most of its cells it had before; a run
+depends on its cell alone, not on where that lies in a grid. Only shards of the same scene, code, libraries, model,
+scheme and members are used, and of these only what is whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+import xarray as xr
+
+from stiffdice import sweep
+from stiffdice.contact import LAWS
+from stiffdice.errors import InputError
+from stiffdice.grid import Column, Piece, Sweep
+from stiffdice.io import read
+from stiffdice.io.digest import CELL
+
+Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], steps
+
+
+def _cell(column: Column, steps: int) -> Cell:
+    return list(LAWS).index(column.contact), column.stiffness, steps
+
+
+class Kept:
+    """The cells of some pieces that shards in a folder hold, but for the shards planned now.
+
+    What is in memory are their places, and the cells of one shard that were asked for together.
+    """
+
+    def __init__(
+        self,
+        plan: Sweep,
+        pieces: Sequence[Piece],
+        folder: Path,
+        planned: Collection[str],
+        say: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        """planned: names of the shards that are not to be used; say: is told what cannot be used."""
+        wanted = {_cell(column, n) for column, steps in pieces for n in steps}
+        self._places: dict[Cell, tuple[Path, int]] = {}
+        like = sweep.pattern(plan)
+        for path in sorted(folder.glob("*.h5")):
+            if path.stem in planned:
+                continue
+            try:
+                for number, cell in enumerate(_cells_of(path, like)):
+                    if cell in wanted:
+                        self._places.setdefault(cell, (path, number))
+            except InputError as error:
+                say(f"not used: {error}")
+        self._of_shard: dict[Path, list[int]] = {}
+        for path, number in self._places.values():
+            self._of_shard.setdefault(path, []).append(number)
+        self._held: dict[int, dict[str, npt.NDArray[Any]]] = {}
+        self._of: tuple[Path, slice] | None = None
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def has(self, column: Column, steps: int) -> bool:
+        """Return whether a cell is there."""
+        return _cell(column, steps) in self._places
+
+    def runs(self, column: Column, steps: int, members: slice) -> dict[str, npt.NDArray[Any]]:
+        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
+        path, number = self._places[_cell(column, steps)]
+        if self._of != (path, members) or number not in self._held:
+            # Those after it are asked for next.
+            numbers = sorted(k for k in self._of_shard[path] if 0 <= k - number < sweep.AT_ONCE)
+            runs = read.some(path, numbers, members)
+            self._of = path, members
+            self._held = {
+                k: {str(name): variable.values[row] for name, variable in runs.data_vars.items()}
+                for row, k in enumerate(numbers)
+            }
+        return self._held[number]
+
+
+def _cells_of(path: Path, like: xr.Dataset) -> Iterator[Cell]:
+    """Yield the cells of a shard if its runs are those of another; raises InputError if it cannot be trusted."""
+    attributes, cells = read.head(path, CELL)
+    if {key: str(value) for key, value in attributes.items()} == {key: str(value) for key, value in like.attrs.items()}:
+        yield from zip(*(cells[name].tolist() for name in CELL), strict=True)
