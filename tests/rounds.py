@@ -25,7 +25,7 @@ def scan(plan: Sweep, columns: list[Column] | None = None) -> list[Piece]:
 
 def judged(plan: Sweep, paths: list[Path]) -> xr.Dataset:
     """Return what shards add up to."""
-    return sweep.collect((part for path in paths for part in parts(path, sweep.AT_ONCE)), plan.criteria)
+    return sweep.collect((part for path in paths for part in parts(path)), plan.criteria)
 
 
 def compute(plan: Sweep, folder: Path) -> list[Path]:

@@ -7,6 +7,7 @@ import pytest
 
 from stiffdice import kept, shards, sweep
 from stiffdice.grid import Piece
+from stiffdice.io.read import open_file
 from stiffdice.kept import Kept
 from tests import rounds
 
@@ -128,3 +129,23 @@ def test_shards_planned_now_are_not_read(small, folder):
     """They are being written, perhaps."""
     names = [path.stem for path in folder.iterdir()]
     assert len(kept.Kept(small, shards.scan(small), folder, names)) == 0
+
+
+def test_shards_that_the_table_puts_elsewhere_are_not_opened(small, folder, monkeypatch):
+    """And what it says wrongly, or not at all, costs no more than time."""
+    opened = []
+    head = kept.read.head
+    monkeypatch.setattr(kept.read, "head", lambda path, names: opened.append(path.stem) or head(path, names))
+    pieces = [piece for piece in shards.scan(small) if piece.column.stiffness == 1e3]
+    paths = sorted(folder.glob("*.h5"))
+    spans = [open_file(path).stiffness.values for path in paths]
+    lines = [f"{p.stem},{s.min():g},{s.max():g},1,1000000" for p, s in zip(paths, spans, strict=True)]
+    head_line = "shard,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"
+    table = folder.parent / "shards.csv"
+    table.write_text("\n".join([head_line, *lines]) + "\n")
+    count = len(Kept(small, pieces, folder, ()))
+    assert count == sum(len(scan) for _, scan in pieces)
+    assert opened == [path.stem for path, span in zip(paths, spans, strict=True) if span.max() >= 1e3]
+    assert len(opened) < len(paths)
+    table.write_text("nonsense\n1\n")
+    assert len(Kept(small, pieces, folder, ())) == count

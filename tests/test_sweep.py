@@ -348,3 +348,28 @@ def test_memory_does_not_grow_with_the_members(tmp_path):
     few, many = peak(128), peak(6400)
     assert (tmp_path / "6400.h5").stat().st_size > 20 * (tmp_path / "128.h5").stat().st_size
     assert many - few < 20_000
+
+
+COLLECTED = """
+import resource, sys
+import numpy as np
+from stiffdice import sweep
+from stiffdice.io.read import open_file
+shard, times = open_file(sys.argv[1]), int(sys.argv[2])
+part = shard.isel(cell=np.resize(np.arange(shard.sizes["cell"]), 1000))
+sweep.collect((part.copy(deep=True) for _ in range(times)), {"energy": 0.05, "apex": 0.05})
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
+"""
+
+
+@pytest.mark.long
+def test_what_is_collected_leaves_its_runs_behind(tmp_path):
+    """A hundred thousand cells of 32 members: their measures alone would be 100 MB, all of their runs 400 MB."""
+    computed(small(members=32), tmp_path)
+    (shard,) = tmp_path.glob("*.h5")
+
+    def peak(times):
+        command = [sys.executable, "-c", COLLECTED, str(shard), str(times)]
+        return int(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+
+    assert peak(100) - peak(2) < 40_000

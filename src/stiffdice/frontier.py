@@ -110,16 +110,21 @@ def confidence(passing: npt.NDArray[np.int64], members: int) -> tuple[Values, Va
 def find(sweep: xr.Dataset) -> xr.Dataset:
     """Return the frontier of a collected sweep by contact law, criterion and stiffness; and the scan, by cell."""
     criteria = meanings_of(sweep.criterion)
-    laws, stiffnesses = np.unique(sweep.contact.values), np.unique(sweep.stiffness.values)
+    laws, law_of = np.unique(sweep.contact.values, return_inverse=True)
+    stiffnesses, stiffness_of = np.unique(sweep.stiffness.values, return_inverse=True)
+    column = law_of * len(stiffnesses) + stiffness_of
+    by_column = np.argsort(column, kind="stable")
+    ends = np.searchsorted(column[by_column], np.arange(len(laws) * len(stiffnesses) + 1))
     shape = (len(laws), len(criteria), len(stiffnesses))
     found = {name: np.full(shape, np.nan) for name in (*EDGES, "flips")}
     fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in FIT}
     passes = sweep.failing.values == 0
-    for k, law in enumerate(laws):
+    for k in range(len(laws)):
         for c in range(len(criteria)):
             inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
-            for s, stiffness in enumerate(stiffnesses):
-                scan = (sweep.contact.values == law) & (sweep.stiffness.values == stiffness)
+            for s in range(len(stiffnesses)):
+                first = k * len(stiffnesses) + s
+                scan = by_column[ends[first] : ends[first + 1]]
                 row = passes[c, scan]
                 for name, value in edges(sweep.steps.values[scan], row).items():
                     found[name][k, c, s] = value

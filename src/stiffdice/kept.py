@@ -7,6 +7,7 @@ scheme and members are used, and of these only what is whole.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -44,10 +45,11 @@ class Kept:
     ) -> None:
         """planned: names of the shards that are not to be used; say: is told what cannot be used."""
         wanted = {_cell(column, n) for column, steps in pieces for n in steps}
+        elsewhere = _elsewhere(folder.parent / "shards.csv", pieces)
         self._places: dict[Cell, tuple[Path, int]] = {}
         like = sweep.pattern(plan)
         for path in sorted(folder.glob("*.h5")):
-            if path.stem in planned:
+            if path.stem in planned or path.stem in elsewhere:
                 continue
             try:
                 for number, cell in enumerate(_cells_of(path, like)):
@@ -73,14 +75,35 @@ class Kept:
         path, number = self._places[_cell(column, steps)]
         if self._of != (path, members) or number not in self._held:
             # Those after it are asked for next.
-            numbers = sorted(k for k in self._of_shard[path] if 0 <= k - number < sweep.AT_ONCE)
+            at_once = max(1, read.RUNS_AT_ONCE // (members.stop - members.start))
+            numbers = sorted(k for k in self._of_shard[path] if 0 <= k - number < at_once)
             runs = read.some(path, numbers, members)
             self._of = path, members
-            self._held = {
-                k: {str(name): variable.values[row] for name, variable in runs.data_vars.items()}
-                for row, k in enumerate(numbers)
-            }
+            self._held = {k: {name: values[row] for name, values in runs.items()} for row, k in enumerate(numbers)}
         return self._held[number]
+
+
+def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
+    """Return the shards that hold none of the cells, as the table of an earlier collection says, if it is there.
+
+    It saves opening all shards in every job, and decides no more than that; stiffness has six digits in it.
+    """
+    grounds = [piece.column.stiffness for piece in pieces]
+    steps = [count for piece in pieces for count in piece.steps]
+    wanted = (
+        {"stiffness_{}_kg_s-2": (min(grounds), max(grounds)), "steps_{}": (min(steps), max(steps))} if steps else {}
+    )
+    try:
+        with table.open(encoding="utf-8", newline="") as file:
+            return {
+                row["shard"]
+                for row in csv.DictReader(file)
+                for name, (low, high) in wanted.items()
+                if float(row[name.format("from")] or "inf") > high * (1 + 1e-5)
+                or float(row[name.format("to")] or "-inf") < low * (1 - 1e-5)
+            }
+    except (OSError, KeyError, ValueError, csv.Error):
+        return set()
 
 
 def _cells_of(path: Path, like: xr.Dataset) -> Iterator[Cell]:

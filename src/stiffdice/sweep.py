@@ -177,10 +177,6 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     return attributes
 
 
-# Cells of a shard to read at a time while collecting.
-AT_ONCE = 4 * CHUNK_CELLS
-
-
 def checked(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
     """Pass a shard on, part by part, if it is the one that `compute` would make of these pieces now.
 
@@ -188,15 +184,22 @@ def checked(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) 
     or cells.
     """
     like = pattern(sweep)
-    cells = ((list(LAWS).index(column.contact), column.stiffness, n) for column, steps in pieces for n in steps)
+    scans = [len(piece.steps) for piece in pieces]
+    planned = {
+        "contact": np.repeat([list(LAWS).index(piece.column.contact) for piece in pieces], scans),
+        "stiffness": np.repeat([piece.column.stiffness for piece in pieces], scans),
+        "steps": np.array([steps for piece in pieces for steps in piece.steps]),
+    }
+    first = 0
     for part in parts:
         check_like(part, like)
-        there = zip(*(part[name].values.tolist() for name in CELL), strict=True)
-        for cell in there:
-            if cell != next(cells, None):
-                raise RefusedError(f"not the shard planned: has another cell, of stiffness = {cell[1]:g}")
+        cells = slice(first, first + part.sizes["cell"])
+        for name in CELL:
+            if not np.array_equal(part[name].values, planned[name][cells]):
+                raise RefusedError(f"not the shard planned: has cells of another {name}")
+        first = cells.stop
         yield part
-    if next(cells, None) is not None:
+    if first < sum(scans):
         raise RefusedError("not the shard planned: cells are missing")
 
 
@@ -218,29 +221,53 @@ def collect(
 ) -> xr.Dataset:
     """Return all cells of all shards, judged: how many members fail each criterion, and the worst of each measure.
 
-    parts: shards, or AT_ONCE cells of one at a time (`io.read.parts`): what is in memory then does not grow with their
-    runs. config: what was asked of the whole; None leaves what was asked of each run. Cells are sorted by contact law,
-    stiffness and steps. Raises InputError if the shards were not made from the same scene by the same code.
+    parts: shards, or some cells of one at a time (`io.read.parts`): in memory are one part, and some 250 bytes for each
+    cell before it, however many members it has. config: what was asked of the whole; None leaves what was asked of each
+    run. Cells are sorted by contact law, stiffness and steps. Raises InputError if the shards were not made from the
+    same scene by the same code, or if there are none.
     """
-    judged: list[xr.Dataset] = []
-    cells: list[bytes] = []
+    pattern: xr.Dataset | None = None
+    columns: dict[str, list[npt.NDArray[Any]]] = {}  # of each variable that has cells, its parts
+    digests = []
     for part in parts:
-        judged.append(_judged(part, tolerances))
-        cells += cell_digests(part)
-        ours, others = judged[-1].attrs, judged[0].attrs
+        judged = _judged(part, tolerances)
+        pattern = judged.isel(cell=slice(0)) if pattern is None else pattern
+        ours, others = judged.attrs, pattern.attrs
         differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
         if differing:
             raise InputError(f"shards differ in {', '.join(differing)}; they are not of one sweep")
-    whole = xr.concat(judged, dim="cell", data_vars="minimal", coords="different", compat="equals", join="exact")
-    order = np.lexsort([whole[key].values for key in ("steps", "stiffness", "contact")])
-    whole = whole.isel(cell=order)
-    whole.attrs = judged[0].attrs | {
-        **(layout.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}),
-        "title": "Sweep of stiffness and steps",
-        "runs_digest": digest_of_cells(cells),
-        "judging_code_digest": code_digest("stiffdice.sweep"),
-    }
-    return whole
+        for name, variable in judged.variables.items():
+            if "cell" in variable.dims:
+                columns.setdefault(str(name), []).append(variable.values)
+        digests.append(cell_digests(part))
+    if pattern is None:
+        raise InputError("there are no shards; nothing to collect")
+    asked = layout.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}
+    return _sorted(pattern, columns).assign_attrs(
+        asked,
+        title="Sweep of stiffness and steps",
+        runs_digest=digest_of_cells(digests),
+        judging_code_digest=code_digest("stiffdice.sweep"),
+    )
+
+
+def _sorted(pattern: xr.Dataset, columns: dict[str, list[npt.NDArray[Any]]]) -> xr.Dataset:
+    """Return all cells, sorted, in the variables of a dataset of none; empties `columns`: none is to be there twice."""
+    order = np.lexsort([np.concatenate(columns[key]) for key in ("steps", "stiffness", "contact")])
+    whole: dict[str, xr.Variable] = {}
+    for key, variable in pattern.variables.items():
+        name = str(key)
+        if name in columns:
+            axis = variable.dims.index("cell")
+            values = np.concatenate(columns.pop(name), axis).take(order, axis)
+            whole[name] = xr.Variable(variable.dims, values, variable.attrs)
+        else:
+            whole[name] = variable
+    return xr.Dataset(
+        {name: variable for name, variable in whole.items() if name not in pattern.coords},
+        {name: variable for name, variable in whole.items() if name in pattern.coords},
+        pattern.attrs,
+    )
 
 
 def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:

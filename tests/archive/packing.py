@@ -88,7 +88,7 @@ def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
             asked = planned.sweeps["steps"]
             sweep.compute(asked, shards.of(asked)[first.stem].pieces, first)
         elif result.stage == "collect":
-            runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path, sweep.AT_ONCE))
+            runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path))
             write_dataset(sweep.collect(runs, planned.sweeps["steps"].criteria), first)
             write_bytes(b"shard,cells\n", top / result.files[1])
         elif result.stage == "frontier":

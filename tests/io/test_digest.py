@@ -184,7 +184,20 @@ def test_what_the_runs_say_does(read, change):
     assert runs_digest(change([part.copy(deep=True) for part in read])) != runs_digest(read)
 
 
+@pytest.mark.parametrize("room", [1, 3000])
+def test_how_much_is_hashed_at_a_time_does_not_count(read, monkeypatch, room):
+    whole = digest.cell_digests(read[0])
+    assert len(set(whole.tolist())) == read[0].sizes["cell"] > 1
+    monkeypatch.setattr(digest, "_BLOCK", room)
+    assert (digest.cell_digests(read[0]) == whole).all()
+
+
+def test_cells_hold_numbers_alone(read):
+    with pytest.raises(TypeError, match="of cells of type <U1"):
+        digest.cell_digests(read[0].assign(word=("cell", np.full(read[0].sizes["cell"], "a"))))
+
+
 def test_a_part_may_hold_no_cells(read):
     empty = read[0].isel(cell=slice(0))
-    assert digest.cell_digests(empty) == []
+    assert len(digest.cell_digests(empty)) == 0
     assert runs_digest([empty]) == runs_digest([])

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from stiffdice.errors import InputError, OutputError
+from stiffdice.io import read
 from stiffdice.io.enums import enum_attributes
 from stiffdice.io.read import open_file, parts
 from stiffdice.io.spool import CHUNK_CELLS, CHUNK_MEMBERS, Spool
@@ -109,6 +110,26 @@ def test_every_chunk_is_compressed_and_has_a_checksum(tmp_path):
             assert "_FillValue" not in stored.attrs
         assert file["ratio"].chunks == (CHUNK_CELLS, CHUNK_MEMBERS)
         assert file["decided"].chunks == (CHUNK_CELLS, CHUNK_MEMBERS, 3)
+
+
+@pytest.mark.parametrize(("members", "cells"), [(1, 1024), (2, 512), (64, 16), (150, 16)])
+def test_a_chunk_of_few_members_holds_the_more_cells(tmp_path, members, cells):
+    """A million cells of one member in chunks of 16 take more to find, and to store, than their values."""
+    with Spool(tmp_path / "x.h5", whole().isel(cell=slice(1), member=slice(members))) as spool:
+        spool.add_cells(1)
+    with h5py.File(tmp_path / "x.h5") as file:
+        assert file["ratio"].chunks == (cells, min(members, CHUNK_MEMBERS))
+        assert file["steps"].chunks == (CHUNK_CELLS * CHUNK_MEMBERS,)
+
+
+@pytest.mark.parametrize(("runs", "cells"), [(1, CHUNK_CELLS), (33 * MEMBERS, 2 * CHUNK_CELLS), (10**6, CELLS)])
+def test_by_itself_a_part_is_whole_chunks_of_about_so_many_runs(tmp_path, monkeypatch, runs, cells):
+    spooled(tmp_path / "x.h5", 7, 11)
+    monkeypatch.setattr(read, "RUNS_AT_ONCE", runs)
+    found = list(parts(tmp_path / "x.h5"))
+    assert [part.sizes["cell"] for part in found[:-1]] == [cells] * (len(found) - 1)
+    for k, part in enumerate(found):
+        xr.testing.assert_identical(part, whole().isel(cell=slice(cells * k, cells * (k + 1))))
 
 
 def test_one_member_and_no_cell_are_files_too(tmp_path):

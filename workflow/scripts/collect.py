@@ -38,7 +38,7 @@ def checked(say: Say) -> Iterator[xr.Dataset]:
         pieces = later[shard.round][shard.part] if shard.round else shard.pieces
         with inputs.reading(path):
             stiffness, steps = [], []
-            for part in sweep.checked(parts(path, sweep.AT_ONCE), asked, pieces):
+            for part in sweep.checked(parts(path), asked, pieces):
                 stiffness += part.stiffness.values.tolist()
                 steps += part.steps.values.tolist()
                 if inputs.whole:

@@ -311,7 +311,7 @@ class _Files:
     def _shard(self, name: str, path: Path) -> Iterator[xr.Dataset]:
         """Yield the parts of a shard, checked, as far as it can be read."""
         self._report.count("hdf5_files")
-        reading, first = parts(path, sweep.AT_ONCE), 0
+        reading, first = parts(path), 0
         while True:
             try:
                 self._admit(path)

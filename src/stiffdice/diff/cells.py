@@ -19,10 +19,9 @@ from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import seal
 from stiffdice.io.digest import CELL, Plain, cell_digests
 from stiffdice.io.read import parts
-from stiffdice.io.spool import CHUNK_CELLS
 
-# Cells of a file to read at a time.
-AT_ONCE = 4 * CHUNK_CELLS
+# Cells of a file to read at a time; none: as many as are well read together.
+AT_ONCE: int | None = None
 
 # Runs that differ are read again, of each side about so many at a time: a run takes some 100 bytes.
 RUNS_AT_ONCE = 200_000
@@ -143,7 +142,7 @@ def _table(part: xr.Dataset, file: int, first: int) -> Table:
     for name in CELL:
         values = part[name].values
         table[name] = values.astype(np.float64).view(np.int64) if values.dtype.kind == "f" else values
-    table["digest"] = np.frombuffer(b"".join(cell_digests(part)), "V32")
+    table["digest"] = cell_digests(part)
     table["file"] = file
     table["row"] = first + np.arange(len(table))
     return table

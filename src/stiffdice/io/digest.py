@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,13 @@ import xarray as xr
 
 # What a cell of a sweep is known by, whichever shard holds it.
 CELL = ("contact", "stiffness", "steps")
+
+# The SHA-256 of each of some cells, shape (cell,).
+DIGEST = np.dtype("V32")
+Digests = npt.NDArray[np.void]
+
+_LENGTH = 8  # bytes of the number that says how long a piece is
+_BLOCK = 1 << 22  # bytes of cells to put in rows at a time
 
 Plain = str | int | float | tuple[Any, ...]
 
@@ -47,34 +54,55 @@ def runs_digest(parts: Iterable[xr.Dataset]) -> str:
     parts: shards, or some cells of one at a time (`io.read.parts`), dimension cell: in memory is one part, and 32 bytes
     for each cell before it. A cell that is there twice counts twice. Attributes do not count.
     """
-    return digest_of_cells(digest for part in parts for digest in cell_digests(part))
+    return digest_of_cells(map(cell_digests, parts))
 
 
-def digest_of_cells(cells: Iterable[bytes]) -> str:
-    """Return the one SHA-256 of all cells whose digests these are, in whatever order."""
-    return hashlib.sha256(b"stiffdice runs 1\n" + b"".join(sorted(cells))).hexdigest()
+def digest_of_cells(parts: Iterable[Digests]) -> str:
+    """Return the one SHA-256 of all cells whose digests these are, dealt to parts in whatever way and order."""
+    cells = np.concatenate([np.empty(0, DIGEST), *parts])
+    cells.sort()
+    whole = hashlib.sha256(b"stiffdice runs 1\n")
+    whole.update(cells.view(np.uint8).data)
+    return whole.hexdigest()
 
 
-def cell_digests(part: xr.Dataset) -> list[bytes]:
+def cell_digests(part: xr.Dataset) -> Digests:
     """Return for each cell the SHA-256 of its contact law, stiffness, steps, and of the values of all its members.
 
-    Hashed are all variables of dimension cell, by name, with their types and what other dimensions they have.
+    Hashed are all variables of dimension cell, by name, with their types and what other dimensions they have. Raises
+    TypeError for types not in our shards, text among them.
     """
     head = _Digest("stiffdice cell 1")
-    rows = []
+    values = []
     for name in sorted(str(name) for name, variable in part.variables.items() if "cell" in variable.dims):
         variable = part.variables[name].transpose("cell", ...)
+        if variable.dtype.kind not in "biuf":
+            raise TypeError(f"a variable of cells of type {variable.dtype}")
         head.put(name)
         _put_dimensions(head, variable.dims[1:], variable.shape[1:])
         head.put(type_of(variable.dtype))
-        rows.append(_rows(variable.values))
-    cells = []
-    for k in range(part.sizes["cell"]):
-        digest = head.copy()
-        for row in rows:
-            digest.put(row[k])
-        cells.append(digest.digest())
-    return cells
+        values.append(variable.values)
+    count = part.sizes["cell"]
+    width = sum(array.nbytes for array in values) // max(1, count)
+    step = max(1, _BLOCK // max(1, width))
+    digests = [
+        head.copy().put_raw(row).digest()
+        for first in range(0, count, step)
+        for row in _pieces([array[first : first + step] for array in values])
+    ]
+    return np.frombuffer(b"".join(digests), DIGEST)
+
+
+def _pieces(values: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.uint8]:
+    """Return in one row for each cell its pieces one after another, each with its length before it: what is hashed.
+
+    One call for a cell instead of two for each of its variables: a sweep may have millions of cells of one member.
+    """
+    columns = []
+    for array in values:
+        image = _canonical(array).reshape(len(array), -1).view(np.uint8)
+        columns += [np.broadcast_to(_length(image.shape[1]), (len(array), _LENGTH)), image]
+    return np.concatenate(columns, axis=1)
 
 
 def plain(value: Any) -> Plain:
@@ -114,8 +142,13 @@ class _Digest:
 
     def put(self, piece: str | bytes | memoryview) -> None:
         data = piece.encode("utf-8", "surrogateescape") if isinstance(piece, str) else piece
-        self._hash.update(len(data).to_bytes(8, "little"))
+        self._hash.update(len(data).to_bytes(_LENGTH, "little"))
         self._hash.update(data)
+
+    def put_raw(self, pieces: npt.NDArray[np.uint8]) -> _Digest:
+        """Add pieces that have their lengths before them, and return the digest."""
+        self._hash.update(pieces.data)
+        return self
 
     def copy(self) -> _Digest:
         other = object.__new__(_Digest)
@@ -127,6 +160,10 @@ class _Digest:
 
     def hexdigest(self) -> str:
         return self._hash.hexdigest()
+
+
+def _length(count: int) -> npt.NDArray[np.uint8]:
+    return np.frombuffer(count.to_bytes(_LENGTH, "little"), np.uint8)
 
 
 def _put_dimensions(digest: _Digest, names: Iterable[Hashable], shape: Iterable[int]) -> None:
@@ -162,14 +199,6 @@ def _image(values: npt.NDArray[Any]) -> memoryview | bytes:
         texts = [str(plain(value)).encode("utf-8", "surrogateescape") for value in values.ravel().tolist()]
         return b"".join(len(text).to_bytes(8, "little") + text for text in texts)
     return _canonical(values).reshape(-1).view(np.uint8).data
-
-
-def _rows(values: npt.NDArray[Any]) -> list[memoryview | bytes]:
-    """Return the same of each part along the first axis."""
-    if values.dtype.kind in "OUST":
-        return [_image(row) for row in values]
-    image = _canonical(values)
-    return [image[k : k + 1].reshape(-1).view(np.uint8).data for k in range(len(image))]
 
 
 def _canonical(values: npt.NDArray[Any]) -> npt.NDArray[Any]:

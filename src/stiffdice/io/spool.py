@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any
 
 import h5netcdf
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -17,8 +18,12 @@ from stiffdice.errors import OutputError
 from stiffdice.io import seal
 from stiffdice.io.write import check_target, store, temporary_of
 
-# Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress.
+# Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress. Of fewer
+# members it holds more cells, as many runs in all: a file has the fewer chunks.
 CHUNK_CELLS, CHUNK_MEMBERS = 16, 64
+_CHUNK_RUNS = CHUNK_CELLS * CHUNK_MEMBERS
+
+_BUFFER = 1 << 19  # bytes of each variable that HDF5 may hold back; by itself it would take 16 times as much
 
 
 class Spool:
@@ -36,21 +41,29 @@ class Spool:
 
     def __enter__(self) -> Spool:
         try:
-            self._file = h5netcdf.File(self._temporary, "w")
+            self._file = h5py.File(self._temporary, "w", track_order=True, rdcc_nbytes=_BUFFER)
+            with h5netcdf.File(self._file, "w") as netcdf:
+                netcdf.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
+                netcdf.attrs.update(self._pattern.attrs)
+                for name, variable in self._pattern.variables.items():
+                    self._create(netcdf, str(name), variable)
         except OSError as error:
             raise self._told(error) from None
-        self._file.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
-        self._file.attrs.update(self._pattern.attrs)
-        for name, variable in self._pattern.variables.items():
-            self._create(str(name), variable)
+        # HDF5's own from here on: looking up the length of a dimension that grows takes h5netcdf longer than a write.
+        self._dimensions = {str(name): variable.dims for name, variable in self._pattern.variables.items()}
+        self._stored = {name: self._file[name] for name in self._dimensions}
+        growing = [self._stored[name] for name, dimensions in self._dimensions.items() if "cell" in dimensions]
+        self._growing = [self._file["cell"], *growing]
         return self
 
-    def _create(self, name: str, variable: xr.Variable) -> None:
-        sizes = {"cell": CHUNK_CELLS, "member": min(CHUNK_MEMBERS, self._pattern.sizes["member"])}
+    def _create(self, netcdf: h5netcdf.File, name: str, variable: xr.Variable) -> None:
+        members = min(CHUNK_MEMBERS, self._pattern.sizes["member"])
+        cells = _CHUNK_RUNS // members if "member" in variable.dims else _CHUNK_RUNS
+        sizes = {"cell": cells, "member": members}
         for dimension, size in variable.sizes.items():
-            if dimension not in self._file.dimensions:
-                self._file.dimensions[str(dimension)] = size
-        stored = self._file.create_variable(
+            if dimension not in netcdf.dimensions:
+                netcdf.dimensions[str(dimension)] = size
+        stored = netcdf.create_variable(
             name,
             tuple(str(dimension) for dimension in variable.dims),
             variable.dtype,
@@ -70,18 +83,17 @@ class Spool:
     def add_cells(self, count: int) -> int:
         """Make room for so many more cells, and return the number of the first."""
         first, self.cells = self.cells, self.cells + count
-        self._file.resize_dimension("cell", self.cells)
+        for stored in self._growing:
+            stored.resize(self.cells, axis=0)
         return first
 
     def put(self, values: Mapping[str, np.ndarray[Any, Any]], cells: slice, members: slice = slice(None)) -> None:
         """Store values by name for some cells, and of those that have members for some of them."""
         try:
             for name, value in values.items():
-                variable = self._file.variables[name]
-                index = tuple(
-                    {"cell": cells, "member": members}.get(dimension, slice(None)) for dimension in variable.dimensions
-                )
-                variable[index] = value
+                given = {"cell": cells, "member": members}
+                index = tuple(given.get(str(dimension), slice(None)) for dimension in self._dimensions[name])
+                self._stored[name][index] = value
         except OSError as error:
             raise self._told(error) from None
 

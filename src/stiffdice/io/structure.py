@@ -39,22 +39,25 @@ _FILTERS = {
 
 
 class Contents(NamedTuple):
-    """What a checked file holds.
+    """What a checked file holds; dimensions that have no values of their own are no variables.
 
     coordinates: the names of the variables that say where the others are. meanings: how many values an enum may have,
-    by its name. sizes: bytes of a variable, by its name; those that only stand for a dimension left out.
+    by its name. sizes: bytes of a variable, by its name. dimensions: names of its axes, by its name. attributes: what
+    it says of itself, by its name; those of the file itself by none (""). What netCDF-4 keeps for itself is left out.
     """
 
     coordinates: frozenset[str]
     meanings: Mapping[str, int]
     sizes: Mapping[str, int]
+    dimensions: Mapping[str, tuple[str, ...]]
+    attributes: Mapping[str, Mapping[str, Any]]
 
 
 def check(file: h5py.File, length: int) -> Contents:
     """Return what an open file of so many bytes holds; raises RefusedError naming the variable if it is not ours."""
     if file.userblock_size:
         raise RefusedError(f"has {file.userblock_size} bytes before its HDF5 content; our files have none")
-    attributes.check_all("the file", file)
+    about = attributes.check_all("the file", file)
     items = {name: _Item(dataset, attributes.check_all(name, dataset)) for name, dataset in _datasets(file).items()}
     sizes = {name: _size_of(name, item.dataset) for name, item in items.items()}
     if sum(sizes.values()) > MOST_BYTES:
@@ -63,7 +66,7 @@ def check(file: h5py.File, length: int) -> Contents:
     for name, item in items.items():
         _check_storage(name, item, sizes[name], stored)
     stored.check()
-    _check_dimensions(file, items)
+    dimensions = _dimensions(file, items)
     variables = {name: item for name, item in items.items() if not item.is_bare}
     meanings = {}
     for name, item in variables.items():
@@ -73,6 +76,8 @@ def check(file: h5py.File, length: int) -> Contents:
         frozenset(_coordinates(file, variables)),
         {name: count for name, count in meanings.items() if count},
         {name: sizes[name] for name in variables},
+        {name: dimensions[name] for name in variables},
+        {"": _told(about), **{name: _told(item.about) for name, item in variables.items()}},
     )
 
 
@@ -225,9 +230,9 @@ class _Stored:
             end = place + size
 
 
-def _check_dimensions(file: h5py.File, items: Mapping[str, _Item]) -> None:
-    """Raise RefusedError unless each axis of each variable is a dimension of the file, and as long."""
-    scales, numbers = {}, set()
+def _dimensions(file: h5py.File, items: Mapping[str, _Item]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the axes; raises RefusedError unless each is a dimension of the file, and as long."""
+    scales, names, numbers = {}, {}, set()
     for name, item in items.items():
         if not item.is_scale:
             continue
@@ -239,7 +244,9 @@ def _check_dimensions(file: h5py.File, items: Mapping[str, _Item]) -> None:
         if "DIMENSION_LIST" in item.about:
             raise RefusedError(f"{name}: a dimension that has dimensions (DIMENSION_LIST)")
         numbers.add(number)
-        scales[h5py.h5o.get_info(item.dataset.id).addr] = item.dataset.shape[0]
+        place = h5py.h5o.get_info(item.dataset.id).addr
+        scales[place], names[place] = item.dataset.shape[0], name
+    dimensions: dict[str, tuple[str, ...]] = {name: (name,) for name in names.values()}
     for name, item in items.items():
         if item.is_scale:
             continue
@@ -248,6 +255,8 @@ def _check_dimensions(file: h5py.File, items: Mapping[str, _Item]) -> None:
             raise RefusedError(f"{name}: DIMENSION_LIST: allowed is a dimension of this file for each axis, as long")
         if len(set(found)) < len(found):
             raise RefusedError(f"{name}: DIMENSION_LIST names a dimension twice")
+        dimensions[name] = tuple(names[place] for place in found)
+    return dimensions
 
 
 def _scales_of(file: h5py.File, name: str, item: _Item) -> Iterator[int]:
@@ -266,6 +275,21 @@ def _coordinates(file: h5py.File, variables: Mapping[str, _Item]) -> Iterator[st
         *(item.about.get("coordinates", "") for item in variables.values()),
     ):
         yield from (word for word in str(named).split() if word in variables)
+
+
+# What netCDF-4 keeps for itself, and which variables are coordinates, which is told apart.
+_ITS_OWN = frozenset(
+    (
+        *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "coordinates"),
+        *("_NCProperties", "_nc3_strict"),
+    )
+)
+
+
+def _told(about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is said of a file or variable to those that read it: a list of one value is a value."""
+    kept = {key: value for key, value in about.items() if key not in _ITS_OWN}
+    return {key: value[0] if np.shape(value) == (1,) else value for key, value in kept.items()}
 
 
 def _shown(size: int) -> str:
