@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff peers study status report archive bench sweep-million test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,6 +33,9 @@ extremes: $(READY)  ## where and how runs fail at the extremes, into results/ext
 
 tradeoff: $(READY)  ## what accuracy costs by scheme, into results/tradeoff/
 	@$(BIN)/python workflow/run.py --cores $(CORES) tradeoff
+
+elastic: $(READY)  ## a dense grid's answer for fewer runs, into results/elastic/
+	@$(BIN)/python workflow/run.py --cores $(CORES) elastic
 
 peers: $(READY)  ## the engines that are installed beside stiffdice, into results/peers/
 	@$(BIN)/python workflow/run.py --cores $(CORES) peers

@@ -4,6 +4,7 @@
 #   snakemake stability                   what "stable" means, measured
 #   snakemake extremes                    where and how runs fail at the extremes
 #   snakemake tradeoff                    what accuracy costs, by scheme
+#   snakemake elastic                     whether fewer runs, put where members disagree, say as much
 #   snakemake peers                       other engines beside stiffdice, as far as they are installed
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
@@ -43,6 +44,11 @@ rule extremes:
 rule tradeoff:
     input:
         lambda wildcards: everything_of("tradeoff"),
+
+
+rule elastic:
+    input:
+        lambda wildcards: everything_of("elastic"),
 
 
 rule peers:

@@ -40,6 +40,10 @@ PAGES = [
     "docs/status.md",
     "docs/robustness.md",
     "docs/trust.md",
+    "docs/slurm.md",
+    "docs/scale.md",
+    "docs/cost.md",
+    "docs/elastic.md",
     "CHANGELOG.md",
 ]
 
@@ -135,8 +139,8 @@ def test_every_engine_is_explained(capsys):
 
 
 def test_make_targets_of_the_readme_exist():
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    named = {name for block in blocks("README.md", "sh") for name in re.findall(r"^make ([a-z]+)", block, re.MULTILINE)}
-    named |= set(re.findall(r"`make ([a-z]+)", (ROOT / "README.md").read_text()))
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = set(re.findall(r"^make ([a-z-]+)", "\n".join(blocks("README.md", "sh")), re.MULTILINE))
+    named |= set(re.findall(r"`make ([a-z-]+)", (ROOT / "README.md").read_text()))
     assert named
     assert named <= targets

@@ -41,6 +41,7 @@ DRAWINGS: dict[str, Entry] = {
     "frontier": Entry(f"{_FIGURES}.frontier", "steps_needed", "sweeps"),
     "stability-map": Entry(f"{_FIGURES}.stability_map", "draw", "sweeps"),
     "comb": Entry(f"{_FIGURES}.comb", "draw", "sweeps"),
+    "elastic": Entry(f"{_FIGURES}.elastic", "draw", "sweeps"),
     "bounce-map": Entry(f"{_FIGURES}.bounce_map", "draw", "experiments", "bounce-map"),
     "rocking": Entry(f"{_FIGURES}.rocking", "draw", "experiments", "rocking"),
     "ledger": Entry(f"{_FIGURES}.ledger", "draw", "experiments", "ledger"),
@@ -62,6 +63,7 @@ DRAWINGS: dict[str, Entry] = {
 # (datasets by name, title) -> a table.
 TABLES: dict[str, Entry] = {
     "answers": Entry("stiffdice.answers", "table", "sweeps"),
+    "elastic": Entry("stiffdice.elastic", "table", "sweeps"),
     "precision": Entry("stiffdice.precision", "table", "experiments", "precision"),
     "tradeoff": Entry("stiffdice.tradeoff", "table", "experiments", "work-precision", timed=True),
     "engine-contact": Entry("stiffdice.engine_tables", "contact", "experiments", "engine-contact"),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from stiffdice import theory
 from stiffdice.requirement import AS_ASKED
@@ -39,7 +40,9 @@ class Sweep:
     """A grid of stiffness and steps.
 
     criteria: tolerances of those asked. early_stop: whether a run ends once all of them are decided. refine: how many
-    times the scan is made twice as dense where members disagree. horizon [s]: until when `trajectory` compares.
+    times the scan is made twice as dense where members disagree. reach: if given, the first scan is every
+    2^refine-th cell of the grid, and each later one halves that within this factor of steps about where they disagree.
+    horizon [s]: until when `trajectory` compares.
     model: the one computed; model_reason: why. simulator: what makes the runs; scheme: its own, if it is an engine.
     seconds_per_job: of predicted work that one job gets; None leaves it to `shards`.
     """
@@ -60,6 +63,7 @@ class Sweep:
     seconds_per_job: float | None = None
     model_reason: str = AS_ASKED
     simulator: str = OURS
+    reach: float | None = None
 
     def scene_of(self, column: Column) -> Scene:
         """Return the sweep's scene on the ground of a column."""
@@ -94,8 +98,13 @@ class Sweep:
         """Return the step counts first tried in a column: spread evenly in their logarithm, jittered within each part.
 
         Round numbers are special (the step may be a whole fraction of everything else in a scene), so none is favoured.
-        What a span scans does not depend on the others.
+        What a span scans does not depend on the others. With `reach` they are one in 2^refine of the grid's.
         """
+        whole = self.whole_scan(column)
+        return whole if self.reach is None else sorted({*whole[:: 2**self.refine], whole[-1]})
+
+    def whole_scan(self, column: Column) -> list[int]:
+        """Return all step counts of a column's grid, ascending; a sweep with `reach` tries some of them."""
         return sorted({steps for span in _each(self._grid) for steps in self._scan_of(span, column)})
 
     def _scan_of(self, span: Span, column: Column) -> set[int]:
@@ -110,10 +119,28 @@ class Sweep:
         scanned: ascending. passing: share of members that pass, shape (criterion, scan). rounds: how many were before.
         """
         clear = (passing[:, 1:] == passing[:, :-1]) & ((passing[:, 1:] == 0) | (passing[:, 1:] == 1))
-        unclear = np.flatnonzero(~clear.all(axis=0)).tolist()
+        unclear = np.flatnonzero(~clear.all(axis=0))
+        if self.reach is not None:
+            return self._nearby(column, scanned, unclear, rounds)
         place = 0.25 + 0.5 * self._jitter(column, rounds).random(len(unclear))
-        low, high = np.log([scanned[k] for k in unclear]), np.log([scanned[k + 1] for k in unclear])
+        places = np.log(scanned)
+        low, high = places[:-1][unclear], places[1:][unclear]
         added = {round(float(steps)) for steps in np.exp(low + (high - low) * place)}
+        return sorted(added - set(scanned))
+
+    def _nearby(self, column: Column, scanned: Sequence[int], unclear: npt.NDArray[np.int64], rounds: int) -> list[int]:
+        """Return one in 2^(refine − rounds) of the grid's cells wherever neighbours lie within reach of unclear ones.
+
+        There even two neighbours that both have all passing may have a cell between them that fails.
+        """
+        assert self.reach is not None
+        places, reach = np.log(scanned), np.log(self.reach)
+        low, high = places[:-1, None], places[1:, None]
+        near = ((high >= places[:-1][unclear] - reach) & (low <= places[1:][unclear] + reach)).any(axis=1)
+        whole = self.whole_scan(column)
+        index = np.searchsorted(whole, scanned)
+        stride = 2 ** (self.refine - rounds)
+        added = {whole[k] for i in np.flatnonzero(near) for k in range(index[i], index[i + 1], stride)}
         return sorted(added - set(scanned))
 
     def _jitter(self, column: Column, rounds: int) -> np.random.Generator:
@@ -141,7 +168,9 @@ class Sweep:
     def of_cells(self) -> dict[str, Any]:
         """What the places of cells depend on besides columns, scene and code: by themselves, and by what was found."""
         spans = [dict(span) for span in _each(self._grid)]
-        grid = {"omega_h" if self.steps is None else "steps": spans if len(spans) > 1 else spans[0]}
+        grid: dict[str, Any] = {"omega_h" if self.steps is None else "steps": spans if len(spans) > 1 else spans[0]}
+        if self.reach is not None:  # every round's cells then depend on how many rounds there are
+            grid |= {"refine": self.refine, "reach": self.reach}
         return self.of_runs | grid | {"seed": self.seed, "criteria": dict(self.criteria), "early_stop": self.early_stop}
 
     @property

@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -54,17 +54,17 @@ def of(sweep: Sweep) -> dict[str, Shard]:
     prices = [costs(sweep, piece) for piece in first]
     total = math.fsum(float(seconds.sum()) for seconds in prices)
     work = sweep.seconds_per_job or max(FEWEST_SECONDS, min(SECONDS, total / JOBS))
-    dealt = list(_cut_at_multiples(first, prices, work))
+    cut = list(_cut_at_multiples(first, prices, work))
     shards = {}
-    for part, (pieces, seconds) in enumerate(dealt):
-        shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, len(dealt), seconds, pieces)
-    expected = _FIRST_REFINEMENT * total
+    for part, (pieces, seconds) in enumerate(cut):
+        shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, len(cut), seconds, pieces)
+    expected, most = _FIRST_REFINEMENT * total, sum(len(piece.steps) for piece in first)
     for number in range(1, sweep.refine + 1):
-        parts = max(1, math.ceil(expected / work))
+        parts = max(1, min(math.ceil(expected / work), most))  # a round has fewer cells than those before it
         for part in range(parts):
             plan = [sweep.columns(), number, part, parts]
             shards[_digest(sweep, sweep.of_cells, plan)] = Shard(number, part, parts, expected / parts)
-        expected *= 2
+        expected, most = 2 * expected, 2 * most
     return shards
 
 
@@ -133,27 +133,29 @@ def costs(sweep: Sweep, piece: Piece) -> Array:
 
 
 def _cut_at_multiples(
-    pieces: Iterable[Piece], prices: Iterable[Array], work: float
+    pieces: Sequence[Piece], prices: Sequence[Array], work: float
 ) -> Iterator[tuple[tuple[Piece, ...], float]]:
-    """Yield pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done."""
-    held: list[Piece] = []
-    seconds, key, law, before = 0.0, (0, 0), "", 0.0
+    """Yield pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done.
+
+    What is left at the end of a law, if it is less than half of that, is done with the part before.
+    """
+    totals: dict[str, float] = {}
     for piece, each in zip(pieces, prices, strict=True):
-        if piece.column.contact != law:
-            law, before = piece.column.contact, 0.0
-        reached = before + np.cumsum(each)
-        # A job's last cell is the one in which its work is reached, so that a dear one does not make two jobs long.
-        numbers = ((reached - each / 2) / work).astype(np.int64)
+        totals[piece.column.contact] = totals.get(piece.column.contact, 0.0) + float(each.sum())
+    parts: dict[tuple[str, int], tuple[list[Piece], list[float]]] = {}
+    before = dict.fromkeys(totals, 0.0)
+    for piece, each in zip(pieces, prices, strict=True):
+        law = piece.column.contact
+        reached = before[law] + np.cumsum(each)
+        last = max(0, int(totals[law] / work + 0.5) - 1)
+        numbers = np.minimum(((reached - each / 2) / work).astype(np.int64), last)
         for number, part in _runs_of(piece, numbers):
-            if held and key != (list(LAWS).index(law), number):
-                yield tuple(held), seconds
-                held, seconds = [], 0.0
-            key = list(LAWS).index(law), number
+            held, taken = parts.setdefault((law, number), ([], []))
             held.append(part)
-            seconds += float(each[numbers == number].sum())
-        before = float(reached[-1])
-    if held:
-        yield tuple(held), seconds
+            taken.append(float(each[numbers == number].sum()))
+        before[law] = float(reached[-1])
+    for held, taken in parts.values():
+        yield tuple(held), math.fsum(taken)
 
 
 def _runs_of(piece: Piece, numbers: npt.NDArray[np.int64]) -> Iterator[tuple[int, Piece]]:

@@ -96,6 +96,7 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
         vmin=-0.15,
         vmax=1.3,
         linewidths=0,
+        rasterized=True,  # as a drawing it would be 170 bytes a cell
     )
     panel.axhline(theory.STABILITY_LIMIT, color=style.INK, linestyle="--", linewidth=1.0)
     scale = frontier.limit.values * theory.STABILITY_LIMIT

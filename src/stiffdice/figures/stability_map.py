@@ -99,10 +99,11 @@ def _rectangles(found: xr.Dataset) -> Array:
     """Return the corners of each cell, in stiffness and ωh, shape (cell, 4, 2)."""
     stiffness, omega_h = found.cell_stiffness.values, found.cell_omega_h.values
     corners = np.empty((len(stiffness), 4, 2))
-    columns = np.unique(stiffness)
+    columns, column_of = np.unique(stiffness, return_inverse=True)
+    by_column = np.argsort(column_of, kind="stable")
+    starts = np.searchsorted(column_of[by_column], np.arange(1, len(columns)))
     sides = style.borders(columns, logarithmic=True)
-    for column, left, right in zip(columns, sides[:-1], sides[1:], strict=True):
-        cells = np.flatnonzero(stiffness == column)
+    for cells, left, right in zip(np.split(by_column, starts), sides[:-1], sides[1:], strict=True):
         ends = style.borders(omega_h[cells], logarithmic=True)
         corners[cells, :, 0] = left, right, right, left
         corners[cells, :, 1] = np.stack([ends[:-1], ends[:-1], ends[1:], ends[1:]], axis=1)
