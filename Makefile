@@ -8,7 +8,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast test-slurm lint types check lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -63,6 +63,9 @@ test: $(READY)  ## run all tests
 
 test-fast: $(READY)  ## run the tests but for the broadest
 	@$(BIN)/python -m pytest -m "not long"
+
+test-slurm: $(READY)  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
+	@tests/slurm/run $(BIN)/python
 
 lint: $(READY)  ## check style (ruff) and the workflow (snakemake --lint)
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/snakemake --lint

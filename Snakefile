@@ -25,6 +25,14 @@ include: "workflow/rules/figures.smk"
 report: "workflow/report/workflow.rst"
 
 
+onstart:
+    ready_for_cluster()
+
+
+onerror:
+    tell_of_cluster()
+
+
 rule paper:
     default_target: True
     input:

@@ -19,7 +19,7 @@ from stiffdice.errors import InputError, OutputError, RefusedError
 from stiffdice.io import seal
 from stiffdice.io.layout import run_dataset
 from stiffdice.io.read import open_file
-from stiffdice.io.write import check_target, write_bytes, write_dataset
+from stiffdice.io.write import check_target, clear, write_bytes, write_dataset
 from stiffdice.scene import from_mapping
 from stiffdice.simulate import simulate
 
@@ -224,3 +224,12 @@ def test_a_full_disk_leaves_what_was_there(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert path.read_bytes() == b"before"
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_what_is_unfinished_of_a_file_and_nothing_else_is_cleared(tmp_path):
+    ours, others = [".a.h5.n1.7.part", ".a.h5.node-2.example.org.8.part"], ["a.h5", ".a.h5", ".ba.h5.n1.7.part"]
+    for name in (*ours, *others):
+        (tmp_path / name).touch()
+    clear(tmp_path / "a.h5")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(others)
+    clear(tmp_path / "nowhere" / "a.h5")

@@ -3,6 +3,7 @@
 import hashlib
 import math
 import sys
+import time
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,10 @@ from stiffdice.errors import InputError
 from stiffdice.provenance import code_digest
 
 SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
+BEGUN = time.time()
+
+# What this process needs besides the rules.
+sys.path.append(str(Path(workflow.basedir) / "workflow"))
 
 
 wildcard_constraints:
@@ -156,6 +161,37 @@ def telling_code(planned):
 def growing(amount):
     """Return a resource that a job gets twice as much of with every further attempt."""
     return lambda wildcards, attempt: amount * 2 ** (attempt - 1)
+
+
+def on_cluster():
+    """Return whether jobs run on other machines, or this is one of them."""
+    return workflow.remote_exec or workflow.non_local_exec
+
+
+def ready_for_cluster():
+    """Look whether Slurm, if that is asked, can be; what is missing ends Snakemake with one line and exit status 2."""
+    if workflow.executor_plugin.name != "slurm":
+        return
+    import slurm
+    from snakemake.logging import logger
+
+    logger.addHandler(slurm.Failures())
+    given = {key: resource.raw for key, resource in (workflow.resource_settings.default_resources or {}).items()}
+    try:
+        line = slurm.prepare(workflow.executor_settings.status_command, given)
+    except slurm.SlurmError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        sys.exit(2)
+    if line:
+        print(f"stiffdice: {line}", file=sys.stderr)
+
+
+def tell_of_cluster():
+    """Say what failed on other machines, as workflow/run.py does for this one."""
+    if on_cluster():
+        import ending
+
+        print(ending.told(Path(workflow.basedir), BEGUN), file=sys.stderr)
 
 
 @cache

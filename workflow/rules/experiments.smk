@@ -23,7 +23,8 @@ rule experiment:
         "../scripts/measure.py"
 
 
-# Alone on the machine: it takes every core that the workflow has, though it uses one.
+# Alone on the machine: it takes every core that the workflow has, though it uses one. On a cluster it asks for one, and
+# the profile for a node of its own.
 rule timing:
     input:
         scene=lambda wildcards: planned_timing(wildcards).scene,
@@ -36,7 +37,7 @@ rule timing:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:
         "results/{study}/benchmarks/timings/{timing}.tsv"
-    threads: workflow.cores
+    threads: lambda wildcards: 1 if on_cluster() else workflow.cores
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),

@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
 
 from stiffdice import job_log
 from stiffdice.errors import StiffdiceError
+from stiffdice.io.write import clear
 from stiffdice.parent import end_with_parent
 
 end_with_parent("snakemake")
@@ -76,6 +77,11 @@ def _stop(number: int, frame: FrameType | None) -> NoReturn:
 
 # Snakemake's script is at its imports, which take a second and may fail: its log begins here.
 _log = _Log(sys.modules["__main__"].snakemake.log[0])
+
+# Slurm sends a job once the one before it is over, and on any node: what that left is nobody's else to remove.
+if "SLURM_JOB_ID" in os.environ:
+    for _output in sys.modules["__main__"].snakemake.output:
+        clear(Path(_output))
 
 
 @contextmanager
