@@ -22,7 +22,7 @@ GRID = {
     "members": 500,
 }
 # Two shards: one of two thirds of the work, which is the larger file, and one of the rest.
-LARGE = rounds.asked_in_parts({**GRID, "stiffness": {"from": 1e3, "to": 1e5, "count": 3}}, 1.4)
+LARGE = rounds.asked_in_parts({**GRID, "stiffness": {"from": 1e3, "to": 1e5, "count": 3}}, 1.55)
 STUDY = {
     "question": "What if some of it fails?",
     "sweeps": {"large": LARGE, "small": {**GRID, "stiffness": 1e3, "members": 4}},

@@ -101,6 +101,11 @@ def shard_of(wildcards):
     return shards_of(wildcards.study, wildcards.sweep)[wildcards.shard]
 
 
+def placing(shard):
+    """Return the modules that say which cells a shard has, if its name does not: those of a later round."""
+    return ["stiffdice.shards"] if shard.round else []
+
+
 def minutes_of(shard):
     """Return how long a shard may take: machines are slower than the one that predictions are for, and compile first."""
     return 10 + 4 * math.ceil(shard.seconds / 60)

@@ -10,7 +10,9 @@ rule shard:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
         sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; the name says what changed
-        code=lambda wildcards: code_of_runs("shard.py", planned_sweep(wildcards).simulator, "stiffdice.sweep"),
+        code=lambda wildcards: code_of_runs(
+            "shard.py", planned_sweep(wildcards).simulator, "stiffdice.sweep", *placing(shard_of(wildcards))
+        ),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
     benchmark:
