@@ -68,15 +68,16 @@ class Project:
             name: path.read_bytes() for name, path in named.items() if not name.startswith(("logs/", "benchmarks/"))
         }
 
-    def shards_at_work(self, count: int = 1) -> list[Path]:
-        """Wait until so many shards are being written, and return their unfinished files."""
+    def shards_at_work(self) -> list[Path]:
+        """Wait until shards are being written, and return their unfinished files."""
 
         def begun() -> list[Path]:
             return sorted(self.results.glob("sweeps/steps/shards/.*.part"))
 
-        until(f"{count} at work", lambda: len(begun()) >= count, 120)
+        until("a shard is at work", begun, 120)
+        found = begun()
         time.sleep(A_MOMENT)
-        return begun()
+        return found
 
 
 class Run:

@@ -156,11 +156,11 @@ def without_accounting(cluster: Cluster):
 
 def test_ctrl_c_cancels_what_was_sent(project):
     started = project.start()
-    project.shards_at_work(4)
+    parts = project.shards_at_work()
     started.process.send_signal(signal.SIGINT)
     assert started.process.wait(60) != 0
     until("no job is left", lambda: not run("squeue", "--noheader"), 30)
-    assert not [name for name in project.data() if name.endswith(".part")], started.said()
+    assert not [part for part in parts if part.exists()], started.said()
 
 
 def test_a_job_that_needs_more_memory_gets_it(project, local):
