@@ -214,3 +214,13 @@ def test_a_full_disk_is_one_line_and_leaves_what_was_there(tmp_path, room):
     assert done.stdout == "out.h5: File too large; nothing was stored\n"
     assert (tmp_path / "out.h5").read_bytes() == b"before"
     assert [entry.name for entry in tmp_path.iterdir()] == ["out.h5"]
+
+
+def test_told_to_stop_while_it_lays_a_file_out_it_leaves_nothing(tmp_path, monkeypatch):
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Spool, "_create", stop)
+    with pytest.raises(KeyboardInterrupt), Spool(tmp_path / "x.h5", whole().isel(cell=slice(1))):
+        pass
+    assert list(tmp_path.iterdir()) == []

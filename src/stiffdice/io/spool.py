@@ -41,20 +41,26 @@ class Spool:
 
     def __enter__(self) -> Spool:
         try:
-            self._file = h5py.File(self._temporary, "w", track_order=True, rdcc_nbytes=_BUFFER)
-            with h5netcdf.File(self._file, "w") as netcdf:
-                netcdf.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
-                netcdf.attrs.update(self._pattern.attrs)
-                for name, variable in self._pattern.variables.items():
-                    self._create(netcdf, str(name), variable)
-        except OSError as error:
-            raise self._told(error) from None
+            self._lay_out()
+        except BaseException as error:  # a signal, too: __exit__ is not called then
+            self._temporary.unlink(missing_ok=True)
+            if isinstance(error, OSError):
+                raise self._told(error) from None
+            raise
         # HDF5's own from here on: looking up the length of a dimension that grows takes h5netcdf longer than a write.
         self._dimensions = {str(name): variable.dims for name, variable in self._pattern.variables.items()}
         self._stored = {name: self._file[name] for name in self._dimensions}
         growing = [self._stored[name] for name, dimensions in self._dimensions.items() if "cell" in dimensions]
         self._growing = [self._file["cell"], *growing]
         return self
+
+    def _lay_out(self) -> None:
+        self._file = h5py.File(self._temporary, "w", track_order=True, rdcc_nbytes=_BUFFER)
+        with h5netcdf.File(self._file, "w") as netcdf:
+            netcdf.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
+            netcdf.attrs.update(self._pattern.attrs)
+            for name, variable in self._pattern.variables.items():
+                self._create(netcdf, str(name), variable)
 
     def _create(self, netcdf: h5netcdf.File, name: str, variable: xr.Variable) -> None:
         members = min(CHUNK_MEMBERS, self._pattern.sizes["member"])
