@@ -58,11 +58,12 @@ def of(sweep: Sweep) -> dict[str, Shard]:
     shards = {}
     for part, (pieces, seconds) in enumerate(cut):
         shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, len(cut), seconds, pieces)
+    columns = [piece.column for piece in first]
     expected, most = _FIRST_REFINEMENT * total, sum(len(piece.steps) for piece in first)
     for number in range(1, sweep.refine + 1):
         parts = max(1, min(math.ceil(expected / work), most))  # a round has fewer cells than those before it
         for part in range(parts):
-            plan = [sweep.columns(), number, part, parts]
+            plan = [columns, number, part, parts]
             shards[_digest(sweep, sweep.of_cells, plan)] = Shard(number, part, parts, expected / parts)
         expected, most = 2 * expected, 2 * most
     return shards

@@ -59,10 +59,11 @@ def compute(
     total, done = sum(sum(piece.steps) for piece in pieces), 0.0
     with Spool(path, pattern(sweep)) as spool:
         for piece in pieces:
+            steps = sum(piece.steps)
             for fraction in _compute_piece(sweep, piece, spool, kept):
                 if progress is not None:
-                    progress((done + fraction * sum(piece.steps)) / total)
-            done += sum(piece.steps)
+                    progress((done + fraction * steps) / total)
+            done += steps
     return spool.cells
 
 
