@@ -36,8 +36,10 @@ def stiffdice(tmp_path, monkeypatch, capsys):
 
 def test_run_stores_a_file_and_says_its_verdict(stiffdice):
     status, out, err, files = stiffdice("run", SCENE, "--model", "sliding", "-o", "out.h5")
-    assert (status, err, files) == (0, "", ["out.h5"])
-    assert out == "out.h5: energy grew: the cube had more energy in the air than at the launch\n"
+    assert (status, files) == (0, ["out.h5"])
+    assert err.startswith("stiffdice: note: 10,000 steps are beyond the limit of linear stability")
+    assert out.startswith("out.h5: energy grew: the cube had more energy in the air than at the launch\n  energy ")
+    assert f"accuracy  was not looked at; this does: stiffdice advise {SCENE} --error 1%\n" in out
     with xr.open_dataset("out.h5") as found:
         assert found.attrs["steps"] == 10_000
         assert found.sizes["time"] == 10_001
@@ -58,7 +60,8 @@ def test_another_simulator_makes_the_same_file(stiffdice):
         options = ["--model", "sliding", "--steps", "2000", "--simulator", simulator, "-o", target]
         assert stiffdice("run", SCENE, *options)[0] == 0
     with xr.open_dataset("ours.h5") as ours, xr.open_dataset("theirs.h5") as theirs:
-        xr.testing.assert_allclose(theirs, ours, rtol=1e-9)
+        # What follows from our force is not told of another's.
+        xr.testing.assert_allclose(theirs, ours.drop_vars("mechanical_energy"), rtol=1e-9)
         assert {key for key in ours.attrs if str(ours.attrs[key]) != str(theirs.attrs[key])} == {
             *("simulator", "simulator_version", "code_digest", "config", "config_digest"),
         }
@@ -75,8 +78,8 @@ def test_another_simulator_makes_the_same_file(stiffdice):
     ],
 )
 def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
-    status, out, err, files = stiffdice("run", SCENE, *change, "-o", "out.h5")
-    assert (status, err, files) == (0, "", ["out.h5"])
+    status, out, _, files = stiffdice("run", SCENE, *change, "-o", "out.h5")
+    assert (status, files) == (0, ["out.h5"])
     assert out.startswith(f"out.h5: {verdict}")
 
 
@@ -149,7 +152,7 @@ def test_inspect_tells_verdict_scene_and_units(stiffdice):
 
 
 def test_auto_says_which_model_and_why_and_stores_it(stiffdice):
-    options = ["--model", "auto", "--set", "launch.velocity=[0, 0, 5]", "--steps", "2000", "--ledger", "-o", "out.h5"]
+    options = ["--model", "auto", "--set", "launch.velocity=[0, 0, 5]", "--steps", "20000", "--ledger", "-o", "out.h5"]
     status, out, err, _ = stiffdice("run", SCENE, *options)
     reason = "vertical: the cube lands flat without spin and nothing moves it sideways"
     assert (status, err) == (0, "")
@@ -187,7 +190,7 @@ def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
     def small_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
 
-    done = command("run", SCENE, "-o", "out.h5", cwd=tmp_path, preexec_fn=small_files)
+    done = command("run", SCENE, "--steps", "20000", "-o", "out.h5", cwd=tmp_path, preexec_fn=small_files)
     assert done.returncode == 2
     assert done.stderr == "stiffdice: out.h5: File too large; nothing was stored\n"
     assert list(tmp_path.iterdir()) == []
@@ -198,14 +201,16 @@ def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
 
     place = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = command("run", SCENE, "-o", "out.h5", cwd=tmp_path, preexec_fn=tiny_files, env=place)
+    done = command("run", SCENE, "--steps", "20000", "-o", "out.h5", cwd=tmp_path, preexec_fn=tiny_files, env=place)
     assert done.returncode == 2
     assert re.fullmatch(r"stiffdice: .*File too large.*\n", done.stderr)
     assert not (tmp_path / "out.h5").exists()
 
 
 def test_a_long_run_tells_its_progress(tmp_path):
-    done = command("run", SCENE, "-o", "out.h5", "--model", "tumbling", "--steps", "2e7", cwd=tmp_path)
+    done = command(
+        "run", SCENE, "--steps", "20000", "-o", "out.h5", "--model", "tumbling", "--steps", "2e7", cwd=tmp_path
+    )
     assert done.returncode == 0
     assert "% done, about " in done.stderr
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from stiffdice.criteria import CRITERIA, tolerances_of
-from stiffdice.judge import judge
+from stiffdice.judge import ending, judge, passes
 from stiffdice.verdict import Verdict
 
 GOOD = {"out_of_range": 0.0, "energy_ratio": 1.0, "apex_ratio": 1.0, "restitution_error": 0.0, "trajectory_error": 0.0}
@@ -13,7 +13,11 @@ ALL = {name: part.TOLERANCE for name, part in CRITERIA.items()}
 
 def judged(tolerances=ALL, endings=(), **measures):
     values = {name: np.array([value]) for name, value in (GOOD | measures).items()}
-    return Verdict(judge(tolerances, values, {ending: np.array([True]) for ending in endings})[0])
+    ended = ending(values, {verdict: np.array([True]) for verdict in endings})
+    passed = [bool(row[0]) for row in passes(tolerances, values, ended)] if tolerances else [ended[0] == Verdict.PASSED]
+    verdict = Verdict(judge(tolerances, values, ended)[0])
+    assert all(passed) == (verdict == Verdict.PASSED)  # of a run and of a cell's member alike
+    return verdict
 
 
 @pytest.mark.parametrize(
@@ -31,6 +35,8 @@ def judged(tolerances=ALL, endings=(), **measures):
         ({"trajectory_error": 1, "restitution_error": 1}, Verdict.RESTITUTION_OFF),
         ({"restitution_error": 1, "apex_ratio": 2}, Verdict.APEX_ROSE),
         ({"apex_ratio": 2, "energy_ratio": 2}, Verdict.ENERGY_GREW),
+        ({"endings": [Verdict.UNRESOLVED]}, Verdict.UNRESOLVED),
+        ({"energy_ratio": 2, "endings": [Verdict.UNRESOLVED]}, Verdict.ENERGY_GREW),
         ({"energy_ratio": 2, "endings": [Verdict.SANK]}, Verdict.SANK),
         ({"endings": [Verdict.SANK, Verdict.STALLED]}, Verdict.STALLED),
         ({"energy_ratio": 2, "endings": [Verdict.UNDECIDED]}, Verdict.UNDECIDED),
@@ -72,7 +78,7 @@ def test_apex_means_nothing_where_the_cube_tumbles():
 def test_an_array_of_runs_is_judged_one_by_one():
     measures = {name: np.full((2, 3), value) for name, value in GOOD.items()}
     measures["apex_ratio"][1, 2] = 2
-    found = judge(ALL, measures, {})
+    found = judge(ALL, measures, ending(measures, {}))
     assert found.shape == (2, 3)
     assert found.dtype == np.int8
     assert np.argwhere(found).tolist() == [[1, 2]]

@@ -43,6 +43,7 @@ DRAWINGS: dict[str, Entry] = {
     "comb": Entry(f"{_FIGURES}.comb", "draw", "sweeps"),
     "elastic": Entry(f"{_FIGURES}.elastic", "draw", "sweeps"),
     "bounce-map": Entry(f"{_FIGURES}.bounce_map", "draw", "experiments", "bounce-map"),
+    "apex-edge": Entry(f"{_FIGURES}.apex_edge", "draw", "experiments", "apex-edge"),
     "rocking": Entry(f"{_FIGURES}.rocking", "draw", "experiments", "rocking"),
     "ledger": Entry(f"{_FIGURES}.ledger", "draw", "experiments", "ledger"),
     "atlas": Entry(f"{_FIGURES}.atlas", "draw", "experiments", "extremes"),
@@ -75,6 +76,7 @@ TABLES: dict[str, Entry] = {
 # (scene, **options) -> a dataset; the function's keyword arguments are the options, with their defaults.
 EXPERIMENTS: dict[str, Entry] = {
     "bounce-map": Entry("stiffdice.experiments.bounce_map", "measure"),
+    "apex-edge": Entry("stiffdice.experiments.apex_edge", "measure"),
     "rocking": Entry("stiffdice.experiments.rocking", "measure"),
     "ledger": Entry("stiffdice.experiments.ledger", "measure"),
     "extremes": Entry("stiffdice.experiments.extremes", "measure"),

@@ -17,6 +17,7 @@ from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.criteria import observe as criteria_observe
 from stiffdice.criteria import open_of
+from stiffdice.models import MODELS
 from stiffdice.scene import Scene
 from stiffdice.simulators import OURS
 from stiffdice.state import STATE, Physics, States
@@ -56,7 +57,7 @@ def march(
 
     watched: `simulate.Watched`. every: keep every K-th state in `samples`; 0 keeps none.
     """
-    start, law = adapter_of(simulator).start, LAWS[scene.ground.contact]
+    start, law, tag = adapter_of(simulator).start, LAWS[scene.ground.contact], MODELS[model]
     count, most = len(ensemble), min(steps, budget)
     for m in range(count):
         engine = start(scene, model, ensemble[m : m + 1].copy(), h, tolerance)
@@ -65,7 +66,7 @@ def march(
             states = np.zeros(min(chunk, most - asked), STATE)
             watched.evaluations[m] += engine.advance(states, 1)
             asked += len(states)
-            goes_on = _look(law, physics, states, ensemble, m, *watched[:4], references, every, samples)
+            goes_on = _look(tag, law, physics, states, ensemble, m, *watched[:4], references, every, samples)
             chunk = min(_MOST, 2 * chunk)
             if progress is not None:
                 progress((m + asked / most) / count)
@@ -73,6 +74,7 @@ def march(
 
 @njit(cache=True)
 def _look(
+    model: Any,
     law: Any,
     physics: Physics,
     states: States,
@@ -94,7 +96,7 @@ def _look(
         ensemble[m] = states[k]
         steps_computed[m] = step
         watch.observe(seen, physics, states[k], step, 0)
-        undecided -= criteria_observe(remembered, step, seen, law, physics, states[k], reference)
+        undecided -= criteria_observe(remembered, step, seen, model, law, physics, states[k], reference)
         if remembered.finite[0] > 0.0:
             return False
         steps_done[m] = step

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from stiffdice import models
 from stiffdice.compiled import njit
 from stiffdice.contact import height_of
 from stiffdice.state import Array, Physics, States
@@ -16,6 +17,21 @@ def kinetic(physics: Physics, state: Any) -> float:
     """Return the kinetic energy of translation and rotation [J], m u²/2 + L²/(2 I) as in the throw listing."""
     ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
     lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
+    return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
+
+
+@njit
+def kinetic_at_place(model: Any, law: Any, physics: Physics, state: Any, behind: float) -> float:
+    """Return the kinetic energy [J] at the time of the place, where the velocities are those of `behind` [s] before.
+
+    They are moved on at the acceleration of the state, as leapfrog's half-step velocities are (Hairer, Lubich and
+    Wanner, Geometric Numerical Integration, I.1.4).
+    """
+    fx, fy, fz, tx, ty, tz = models.force(model, law, physics, state)
+    late = behind / physics.mass
+    ux, uy, uz = state.velocity[0] + late * fx, state.velocity[1] + late * fy, state.velocity[2] + late * fz
+    momentum = state.angular_momentum
+    lx, ly, lz = momentum[0] + behind * tx, momentum[1] + behind * ty, momentum[2] + behind * tz
     return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
 
 
@@ -46,4 +62,17 @@ def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
         result[0][k] = kinetic(physics, states[k])
         result[1][k] = potential(physics, states[k])
         result[2][k] = elastic(physics, states[k])
+    return result
+
+
+@njit(cache=True)
+def mechanical(model: Any, law: Any, physics: Physics, states: States, behind: float) -> Array:
+    """Return kinetic + m g z + the springs' energy [J] of each state at the time of its place, shape (state,).
+
+    behind [s]: how much earlier than the place the velocities are.
+    """
+    result = np.empty(states.shape[0])
+    for k in range(states.shape[0]):
+        moving = kinetic_at_place(model, law, physics, states[k], behind)
+        result[k] = moving + potential(physics, states[k]) + elastic(physics, states[k])
     return result

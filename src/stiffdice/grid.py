@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice import theory
+from stiffdice.criteria.apex import default_hop_height
 from stiffdice.requirement import AS_ASKED
 from stiffdice.scene import Scene
 from stiffdice.simulators import OURS
@@ -42,7 +43,8 @@ class Sweep:
     criteria: tolerances of those asked. early_stop: whether a run ends once all of them are decided. refine: how many
     times the scan is made twice as dense where members disagree. reach: if given, the first scan is every
     2^refine-th cell of the grid, and each later one halves that within this factor of steps about where they disagree.
-    horizon [s]: until when `trajectory` compares.
+    horizon [s]: until when `trajectory` compares. hop_height [m]: rebounds that stay lower are not judged by `apex`;
+    a tenth of the cube's radius if none is given.
     model: the one computed; model_reason: why. simulator: what makes the runs; scheme: its own, if it is an engine.
     seconds_per_job: of predicted work that one job gets; None leaves it to `shards`.
     """
@@ -64,6 +66,11 @@ class Sweep:
     model_reason: str = AS_ASKED
     simulator: str = OURS
     reach: float | None = None
+    hop_height: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.hop_height is None:
+            object.__setattr__(self, "hop_height", default_hop_height(self.scene))
 
     def scene_of(self, column: Column) -> Scene:
         """Return the sweep's scene on the ground of a column."""
@@ -156,6 +163,7 @@ class Sweep:
             "simulator": self.simulator,
             "scheme": self.scheme,
             "members": self.members,
+            "hop_height": self.hop_height,
         }
         if "trajectory" in self.criteria:
             config["horizon"] = self.horizon

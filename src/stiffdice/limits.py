@@ -1,21 +1,29 @@
-"""Up to which ωh a scheme of fixed steps is linearly stable on a damped contact, and a scene's fastest contact."""
+"""Up to which ωh a scheme of fixed steps is linearly stable on a damped contact, a scene's fastest contact, and the
+steps that resolve both.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from stiffdice import theory
 from stiffdice.scene import Scene
+from stiffdice.state import TOUCHING, TURNING, Array
 
 # Limits are looked for up to this ωh, in so many parts of it; all of explicit schemes are below three.
 _LONGEST, _LOOKS = 3.0, 3000
 
 # What round-off may add to an eigenvalue of modulus one.
 _ROUND_OFF = 1e-12
+
+
+# A damping ratio at which springs no longer matter to how fast a motion decays.
+_OVERDAMPED = 1e6
 
 
 class Hardest(NamedTuple):
@@ -33,16 +41,66 @@ def hardest(scene: Scene, model: str) -> Hardest:
     is faster. ζ = (D/S) ω/2, as dashpots stand beside the springs. All zero where nothing touches.
     """
     stiffness, damping = scene.ground.stiffness, scene.ground.damping
-    if model == "flying" or stiffness == 0:
+    if model not in TOUCHING or stiffness == 0:
         return Hardest(0.0, 0.0, "none")
-    omega, mode = theory.contact_frequency(stiffness, scene.cube.mass), "bounce, ω² = 4 S/m"
-    if model == "tumbling":
-        upright = scene.with_ground(normal=(0.0, 0.0, 1.0))
-        offsets = scene.cube.node_offsets()
-        rocking = math.sqrt(float(theory.contact_modes(upright, offsets, offsets[:, 2] < 0)[-1]))
-        if rocking > omega * (1 + _ROUND_OFF):
-            omega, mode = rocking, f"rocking, ω² = {rocking**2 * scene.cube.mass / stiffness:.3g} S/m"
+    nodes = _nodes_of_mode(scene, model, falling=False)
+    mode = f"bounce, ω² = {nodes:g} S/m" if nodes == theory.BOUNCE_NODES else f"rocking, ω² = {nodes:.3g} S/m"
+    omega = theory.contact_frequency(stiffness, scene.cube.mass, nodes)
     return Hardest(omega, damping / stiffness * omega / 2, mode)
+
+
+def _nodes_of_mode(scene: Scene, model: str, *, falling: bool) -> float:
+    """Return k of the fastest mode's ω² = k S/m and damping k D/m: of a cube on a face, or of one damped in mid-air."""
+    nodes = 2 * theory.BOUNCE_NODES if falling else theory.BOUNCE_NODES
+    if model not in TURNING:
+        return nodes
+    offsets = scene.cube.node_offsets()
+    upright = scene.with_ground(normal=(0.0, 0.0, 1.0), stiffness=1.0)
+    modes = theory.contact_modes(upright, offsets, np.ones(len(offsets), bool) if falling else offsets[:, 2] < 0)
+    turning = float(modes[-1]) * scene.cube.mass
+    return turning if turning > nodes * (1 + _ROUND_OFF) else nodes
+
+
+class Fewest(NamedTuple):
+    """The fewest steps [1], not rounded, that keep a run within the linear limit of its scheme; 0 where there is none.
+
+    contact: of the fastest contact mode (`hardest`). drag: of a falling cube's damping under the ungated law.
+    """
+
+    contact: float
+    drag: float
+
+
+@lru_cache(maxsize=64)  # the cells of a column share them
+def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
+    """Return the steps below which a force that a run may meet is beyond the linear limit of its scheme."""
+    if model not in TOUCHING:
+        return Fewest(0.0, 0.0)
+    mass, ground = scene.cube.mass, scene.ground
+    with np.errstate(all="ignore"):  # numbers of a scene may be anything
+        decay = scene.duration / np.float64(_longest_decay(scheme))
+        omega, zeta, _ = hardest(scene, model)
+        if omega > 0 and zeta < _OVERDAMPED:
+            contact = np.float64(omega) * scene.duration / stability_limit(scheme, zeta)
+        else:
+            contact = _nodes_of_mode(scene, model, falling=False) * ground.damping / np.float64(mass) * decay
+        drag = _nodes_of_mode(scene, model, falling=True) * ground.damping / np.float64(mass) * decay
+    return Fewest(float(contact), float(drag) if ground.contact == "ungated" else 0.0)
+
+
+def _longest_decay(scheme: str) -> float:
+    """Return the rate times step size [1] up to which a scheme damps a speed that decays by itself."""
+    return 2 * _OVERDAMPED * stability_limit(scheme, _OVERDAMPED)
+
+
+def half_turn_steps(scene: Scene, momentum: Array) -> Array:
+    """Return the fewest steps [1] at which a cube turns by at most half a turn in a step, shape (...).
+
+    momentum: angular momenta [kg m²/s], shape (..., 3).
+    """
+    with np.errstate(all="ignore"):
+        rate = np.hypot(np.hypot(momentum[..., 0], momentum[..., 1]), momentum[..., 2]) / scene.cube.moment_of_inertia
+        return np.asarray(scene.duration * rate / math.pi)
 
 
 def stability_limit(scheme: str, zeta: float) -> float:

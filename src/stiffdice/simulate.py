@@ -11,21 +11,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice import checks, phases, requirement, schemes, simulators, watch, watched_lanes
+from stiffdice import checks, judge, phases, requirement, schemes, simulators, watch, watched_lanes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.criteria import MEMORY, limits_of, open_of, tolerances_of, values
 from stiffdice.criteria import observe as criteria_observe
 from stiffdice.criteria import start as criteria_start
-from stiffdice.criteria.energy import ceiling
-from stiffdice.energy import energies
+from stiffdice.criteria.apex import default_hop_height
+from stiffdice.criteria.energy import ceiling, finish
+from stiffdice.endings import endings_of
+from stiffdice.energy import energies, mechanical
 from stiffdice.errors import InputError
 from stiffdice.flight import free_steps
-from stiffdice.judge import judge
 from stiffdice.models import MODELS
 from stiffdice.reference import none
 from stiffdice.scene import Scene
-from stiffdice.state import STATE, Array, Ensemble, Physics, States, along, physics_of, start_of
+from stiffdice.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
 from stiffdice.verdict import Verdict
 from stiffdice.watch import SIGHT
 
@@ -38,6 +39,8 @@ class Trajectory:
 
     step, time [s], state (STATE records) and energies [J]: shape (time,) each.
     `energy_paper` is kinetic + m g z, the listings' energy; the springs' elastic energy comes on top.
+    mechanical_energy: all three with the velocity at the time of the place (`energy.mechanical`); none where the force
+    is an engine's own.
     """
 
     step: npt.NDArray[np.int64]
@@ -46,6 +49,7 @@ class Trajectory:
     kinetic_energy: Array
     potential_energy: Array
     elastic_energy: Array
+    mechanical_energy: Array | None
 
     @property
     def energy_paper(self) -> Array:
@@ -63,7 +67,8 @@ class Run:
     stopped, all being decided, or left the range of doubles. decided: int64 (member, criterion), the step that decided
     a criterion, in the registry's order; 0 if none did before the end. steps_computed: int64 (member,), those not taken
     at once. evaluations: int64 (member,), of the force. tolerance [1]: of the error, for a scheme that controls its
-    own. verdict: int8 (member,), a `Verdict`. end: the last state, shape (member, ...).
+    own. ending, verdict: int8 (member,), a `Verdict` each: how the run ended whatever it was asked, and with it
+    (`judge.py`). end: the last state, shape (member, ...). hop_height [m]: below which `apex` judges no rebound.
     simulator: what made the run, of which version.
     """
 
@@ -76,12 +81,14 @@ class Run:
     steps: int
     tolerance: float
     tolerances: dict[str, float]
+    hop_height: float
     measures: dict[str, Array]
     touchdown_phase: Array
     steps_done: npt.NDArray[np.int64]
     decided: npt.NDArray[np.int64]
     steps_computed: npt.NDArray[np.int64]
     evaluations: npt.NDArray[np.int64]
+    ending: npt.NDArray[np.int8]
     verdict: npt.NDArray[np.int8]
     end: States
     trajectory: Trajectory | None
@@ -106,6 +113,7 @@ def simulate(
     criteria: Mapping[str, float] | None = None,
     stop: Mapping[str, float] | None = None,
     references: npt.NDArray[np.void] | None = None,
+    hop_height: float | None = None,
     budget: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
@@ -119,8 +127,9 @@ def simulate(
     which agrees with stepping as listed to round-off; None does so where no state is kept. members: the launches of an
     ensemble; None runs the scene's own launch. criteria: tolerances of those that the verdict asks; None asks the
     default ones. stop: end a run as soon as all of these criteria are decided at these tolerances. references: what
-    `trajectory` compares with, one for all or one for each member (`reference.make`). budget: most steps to compute one
-    by one; a run that needs more ends undecided. progress: called with the fraction done, some times a second.
+    `trajectory` compares with, one for all or one for each member (`reference.make`). hop_height [m]: rebounds that
+    stay lower are not judged by `apex`; None takes a tenth of the cube's radius. budget: most steps to compute one by
+    one; a run that needs more ends undecided. progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
     engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.
@@ -131,12 +140,9 @@ def simulate(
         raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
     model, model_reason = requirement.chosen(model, [scene], scene.duration / steps)
     simulators.check_fit(simulator, scheme, scene, model)
-    tolerance = checks.number("tolerance", tolerance, "1", above=0)
-    if not schemes.FINEST <= tolerance <= schemes.COARSEST:
-        raise InputError(
-            f"tolerance = {tolerance:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}"
-        )
+    tolerance = _checked_tolerance(tolerance)
     tolerances = tolerances_of(model, criteria)
+    hop = default_hop_height(scene) if hop_height is None else checks.number("hop_height", hop_height, "m", at_least=0)
     own = Ensemble(start_of(scene, model), np.zeros(1))
     launches, late = own if members is None else members
     ensemble = launches.copy()
@@ -154,7 +160,8 @@ def simulate(
     if every is not None:
         samples[0] = ensemble[0]
     lag = simulators.lag_of(simulator, scheme)
-    _begin(physics, ensemble, watched.memory, watched.sight, h, steps, late, lag)
+    tags = MODELS[model], LAWS[scene.ground.contact]
+    _begin(*tags, physics, ensemble, watched.memory, watched.sight, h, steps, late, lag, hop)
     compared = none() if references is None else references
 
     leaping = True if leap or (leap is None and every is None) else None
@@ -162,8 +169,7 @@ def simulate(
     def advance(stop: int) -> None:
         _march(
             schemes.SCHEMES[scheme],
-            MODELS[model],
-            LAWS[scene.ground.contact],
+            *tags,
             physics,
             ensemble,
             *watched,
@@ -186,17 +192,18 @@ def simulate(
     else:
         alone = every is not None or progress is not None or budget is not None or references is not None
         left = count
-        if leaping and not alone and watched_lanes.pays(scene, model, scheme, ensemble):
+        grounded = bool(watched.sight["touched"].any())
+        if leaping and not (alone or grounded) and watched_lanes.pays(scene, model, scheme, ensemble):
             left = watched_lanes.march(scene, model, physics, ensemble, watched, steps)
         if left > 0:
             _in_chunks(advance, steps, scheme, progress)
 
+    _finish(physics, ensemble, watched.memory, watched.sight)
     found = values(watched.memory)
-    endings = {
-        Verdict.SANK: _sunk(physics, ensemble, watched),
-        Verdict.STALLED: _stalled(launches, h),
-        Verdict.UNDECIDED: (watched.steps_done < steps) & (watched.steps_computed >= most),
-    }
+    spent = (watched.steps_done < steps) & (watched.steps_computed >= most)
+    method = scheme if simulator == simulators.OURS else None
+    endings = endings_of(scene, model, method, steps, launches, ensemble, watched.memory, watched.sight)
+    ended = judge.ending(found, endings | {Verdict.UNDECIDED: spent})
     return Run(
         scene,
         model,
@@ -207,16 +214,27 @@ def simulate(
         steps,
         tolerance,
         tolerances,
+        hop,
         found,
         watched.sight["touchdown_phase"].copy(),
         watched.steps_done,
         watched.memory["decided"].copy(),
         watched.steps_computed,
         watched.evaluations,
-        judge(tolerances, found, endings),
+        ended,
+        judge.judge(tolerances, found, ended),
         ensemble,
-        None if every is None else _trajectory(scene, physics, samples, every, steps, int(watched.steps_done[0])),
+        None
+        if every is None
+        else _trajectory(scene, model, simulator, lag, physics, samples, every, steps, int(watched.steps_done[0])),
     )
+
+
+def _checked_tolerance(tolerance: float) -> float:
+    number = checks.number("tolerance", tolerance, "1", above=0)
+    if not schemes.FINEST <= number <= schemes.COARSEST:
+        raise InputError(f"tolerance = {number:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}")
+    return number
 
 
 def _in_chunks(
@@ -260,6 +278,8 @@ def _room_for(steps: int, every: int | None) -> States:
 
 @njit(cache=True)
 def _begin(
+    model: Any,
+    law: Any,
     physics: Physics,
     ensemble: States,
     memory: npt.NDArray[np.void],
@@ -268,12 +288,20 @@ def _begin(
     steps: int,
     late: Array,
     lag: float,
+    hop_height: float,
 ) -> None:
     """Let everything that watches a run look at its launch."""
     for m in range(ensemble.shape[0]):
-        watch.start(sight[m], physics, ensemble[m], h, late[m], lag)
+        watch.start(sight[m], physics, ensemble[m], h, late[m], lag, hop_height)
         sight[m].steps = steps
-        criteria_start(memory[m], sight[m], physics, ensemble[m])
+        criteria_start(memory[m], sight[m], model, law, physics, ensemble[m])
+
+
+@njit(cache=True)
+def _finish(physics: Physics, ensemble: States, memory: npt.NDArray[np.void], sight: npt.NDArray[np.void]) -> None:
+    """Let the energy look at the last state of each run."""
+    for m in range(ensemble.shape[0]):
+        finish(memory[m].energy, sight[m], physics, ensemble[m])
 
 
 @njit(cache=True)
@@ -327,7 +355,7 @@ def _march(
             evaluations[m] += evaluated
             step = done + taken
             watch.observe(seen, physics, state, step, flown)
-            undecided -= criteria_observe(remembered, step, seen, law, physics, state, reference)
+            undecided -= criteria_observe(remembered, step, seen, model, law, physics, state, reference)
             if remembered.finite[0] > 0.0:
                 done = step - 1 if computed > 0 else done
                 break
@@ -368,36 +396,35 @@ def _leap(
     held = seen.held
     skipped = phases.skip(scheme, model, law, physics, state, seen, most)
     most = min(most - skipped, left)
-    # Where the motion is compared, known by phases, or has just come to rest, every step is looked at.
-    if compared or seen.held > held or phases.follows(scheme, model, physics, state, seen):
+    # Where the motion is compared, known by phases, has just come to rest or never left the ground, every step counts.
+    if (
+        compared
+        or remembered.energy[3] > 0.0
+        or seen.held > held
+        or phases.follows(scheme, model, physics, state, seen)
+    ):
         most = 1
     high, low = ceiling(remembered.energy), phases.rest_of(model, law, physics, seen)
     taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
     return skipped + taken, 0, computed, evaluated
 
 
-def _sunk(physics: Physics, ensemble: States, watched: Watched) -> npt.NDArray[np.bool_]:
-    """Return whether every node ended below the ground, shape (member,), and not just in the middle of a bounce.
-
-    A bounce ends, if the cube rests with its upper nodes out, and is no deeper than the energy of the launch takes it.
-    """
-    normal = np.array([physics.nx, physics.ny, physics.nz])
-    with np.errstate(all="ignore"):  # a run that blew up has infinite heights
-        heights = along(ensemble["position"][:, None, :] + ensemble["node_offset"], normal)
-        fall = np.sqrt(watched.memory["energy"][:, 2] / (2 * physics.stiffness))
-    sag = watched.sight["sag"]
-    bounces = (sag < physics.side) & (-heights.min(axis=1) <= 2 * sag + fall)
-    return np.asarray((heights < 0).all(axis=1) & ~bounces)
-
-
-def _stalled(launches: States, h: float) -> npt.NDArray[np.bool_]:
-    """Return whether a step at the speed of the launch is lost in round-off of the place, shape (member,)."""
-    place, speed = launches["position"], launches["velocity"]
-    with np.errstate(over="ignore"):  # launches may be anything
-        return np.asarray(((speed != 0) & (place + h * speed == place)).any(axis=1))
-
-
-def _trajectory(scene: Scene, physics: Physics, samples: States, every: int, steps: int, steps_done: int) -> Trajectory:
+def _trajectory(
+    scene: Scene,
+    model: str,
+    simulator: str,
+    lag: float,
+    physics: Physics,
+    samples: States,
+    every: int,
+    steps: int,
+    steps_done: int,
+) -> Trajectory:
     state = samples[: steps_done // every + 1]
     step = np.arange(len(state), dtype=np.int64) * every
-    return Trajectory(step, step / steps * scene.duration, state, *energies(physics, state))
+    whole = None
+    if simulator == simulators.OURS:
+        behind = lag * scene.duration / steps
+        whole = mechanical(MODELS[model], LAWS[scene.ground.contact], physics, state, behind)
+    kinetic, potential, elastic = energies(physics, state)
+    return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, whole)

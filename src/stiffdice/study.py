@@ -388,6 +388,7 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         sweep.get("seconds_per_job"),
         simulator=simulator,
         reach=sweep.get("reach"),
+        hop_height=sweep.get("hop_height"),
     )
     model, reason = _model_of(asked)
     planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice import criteria, simulators, theory
+from stiffdice import criteria, judge, simulators, theory
 from stiffdice.contact import LAWS
 from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError, RefusedError
@@ -25,10 +25,8 @@ from stiffdice.simulate import Run, simulate
 from stiffdice.state import TURNING
 from stiffdice.verdict import Verdict
 
-Flags = npt.NDArray[np.bool_]
-
 # What a shard keeps of each run besides the measures.
-_OF_RUNS = ("touchdown_phase", "verdict", "steps_done", "steps_computed", "decided")
+_OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
 
 # Members computed together: their references are in memory together.
 BLOCK = CHUNK_MEMBERS
@@ -110,20 +108,7 @@ def _run(
         criteria=sweep.criteria,
         stop=sweep.criteria if sweep.early_stop else None,
         references=compared,
-    )
-
-
-def passes(tolerances: Mapping[str, float], measures: Mapping[str, npt.ArrayLike]) -> Flags:
-    """Return whether each criterion asked holds, shape (criterion, ...) before the shape of the measures.
-
-    None holds where a number left the range of doubles.
-    """
-    inside = np.asarray(measures["out_of_range"]) == 0
-    return np.stack(
-        [
-            inside & criteria.holds(name, measures[criteria.CRITERIA[name].MEASURE], tolerance)
-            for name, tolerance in tolerances.items()
-        ]
+        hop_height=sweep.hop_height,
     )
 
 
@@ -172,9 +157,9 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     attributes["early_stop"] = int(sweep.early_stop)
     if sweep.early_stop:  # otherwise the measures hold for any tolerances
         attributes["criteria"] = layout.criteria_text(sweep.criteria)
-    if "trajectory" in sweep.criteria:
-        attributes["horizon"] = sweep.horizon
-        attributes["horizon_units"] = "s"
+    for name, unit in (("horizon", "s"), ("hop_height", "m")):
+        if name in sweep.of_runs:
+            attributes |= {name: sweep.of_runs[name], f"{name}_units": unit}
     return attributes
 
 
@@ -280,7 +265,7 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     variables: dict[str, Any] = {
         "failing": (
             ("criterion", "cell"),
-            (~passes(tolerances, measures)).sum(axis=-1).astype(np.int32),
+            (~judge.passes(tolerances, measures, runs["ending"].values)).sum(axis=-1).astype(np.int32),
             {"long_name": "number of members that fail the criterion", "units": "1"},
         ),
         "verdicts": (

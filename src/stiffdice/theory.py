@@ -17,7 +17,7 @@ STABILITY_LIMIT = 2.0
 BOUNCE_NODES = 4
 
 
-def contact_frequency(stiffness: float, mass: float, nodes: int = BOUNCE_NODES) -> float:
+def contact_frequency(stiffness: float, mass: float, nodes: float = BOUNCE_NODES) -> float:
     """Return ω = √(kS/m) [rad/s] of a contact mode that k nodes carry: 4 in a flat landing."""
     # Not √(kS/m): the quotient may leave the range of doubles where its root does not.
     return math.sqrt(nodes) * math.sqrt(stiffness) / math.sqrt(mass)

@@ -34,8 +34,8 @@ class Verdict(IntEnum):
 
 
 _SENTENCES = {
-    Verdict.PASSED: "passed: every criterion asked holds",
-    Verdict.UNRESOLVED: "unresolved: passed, with steps longer than the linear limit of a force it met, or half a turn",
+    Verdict.PASSED: "passed: every criterion that was looked at holds; accuracy is another question",
+    Verdict.UNRESOLVED: "unresolved: steps beyond the linear limit of a force it met, or of more than half a turn",
     Verdict.OFF_TRAJECTORY: "off trajectory: the cube was farther from the reference than allowed",
     Verdict.RESTITUTION_OFF: "restitution off: a bounce gave back more or less than the contact law does",
     Verdict.APEX_ROSE: "apex rose: a rebound went higher than the one before",

@@ -20,17 +20,18 @@ from stiffdice.state import Physics
 # Of one run. Constants: step_size [s], steps (of the whole run, set by who makes it), late [s] (how far along the
 # scene's flight the launch is), lag [steps], pull (gravity towards the ground, along its normal) [m/s²], sag [m] (how
 # deep a cube at rest sinks in, at most its side), room [m] (how much higher than the four lowest nodes the others are
-# at the launch; 0 if those are not level).
+# at the launch; 0 if those are not level), hop_height [m] (lower rebounds are not judged by `apex`).
 # Of the last step: time [s] since the scene's launch, clearance of the lowest node [m], speed away from the ground
-# [m/s] and the speed one step before; flight: how many steps in a row have been in the air; lifted: 1 if in this step a
-# flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
-# change any more (`phases.py`). Of the last bounce: speed_in, speed_out [m/s] at zero clearance, NaN if unknown.
+# [m/s] and the speed one step before; flight: how many steps in a row have been in the air; lifted: 1 if in this step
+# a flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
+# change any more (`phases.py`); touched: 1 if a node was on the ground at any step so far. Of the last bounce:
+# speed_in, speed_out [m/s] at zero clearance, NaN if unknown.
 SIGHT = np.dtype(
     [
         (name, np.float64)
         for name in (
-            *("step_size", "steps", "late", "lag", "pull", "sag", "room"),
-            *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted", "still", "held"),
+            *("step_size", "steps", "late", "lag", "pull", "sag", "room", "hop_height"),
+            *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted", "still", "held", "touched"),
             *("speed_in", "speed_out", "bounces", "touchdown_phase"),
         )
     ]
@@ -48,11 +49,12 @@ def clearance_of(physics: Physics, state: Any, height: float, speed: float, h: f
 
 
 @njit
-def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: float) -> None:
+def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: float, hop_height: float) -> None:
     """Begin to watch a run that stands at its launch."""
     sight.step_size = h
     sight.late = late
     sight.lag = lag
+    sight.hop_height = hop_height
     sight.pull = physics.gravity * physics.nz
     sight.sag = 0.0
     if sight.pull > 0.0:
@@ -66,6 +68,7 @@ def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: 
     sight.clearance = sight.height - lowest_of(physics, state)
     # A launch in the air is amid its flight, not at the start of one.
     sight.flight = 2.0 if sight.clearance > 0.0 else 0.0
+    sight.touched = 1.0 if sight.clearance <= 0.0 else 0.0
     sight.lifted = 0.0
     sight.still = 0.0
     sight.held = 0.0
@@ -100,6 +103,7 @@ def observe(sight: Any, physics: Physics, state: Any, step: int, flown: int) -> 
             if sight.flight > 1.0:
                 sight.speed_in = _at_the_ground(sight, sight.speed, sight.speed_before, sight.clearance)
         sight.flight = 0.0
+        sight.touched = 1.0
     sight.still = 1.0 if flown == 0 and height == sight.height and speed == sight.speed else 0.0
     sight.time = sight.late + step * h
     sight.height = height

@@ -208,11 +208,19 @@ def _enter(
 
 @njit
 def _show(
-    law: Any, physics: Physics, state: Any, seen: Any, remembered: Any, reference: Any, step: int, flown: int
+    model: Any,
+    law: Any,
+    physics: Physics,
+    state: Any,
+    seen: Any,
+    remembered: Any,
+    reference: Any,
+    step: int,
+    flown: int,
 ) -> bool:
     """Show a step to all who watch; return whether every number is in range."""
     watch.observe(seen, physics, state, step, flown)
-    criteria_observe(remembered, step, seen, law, physics, state, reference)
+    criteria_observe(remembered, step, seen, model, law, physics, state, reference)
     return remembered.finite[0] == 0.0
 
 
@@ -235,7 +243,7 @@ def _come_out(
     seen.speed_before = block[EARLIER, lane]
     ratio = 1.0 + (block[WORST, lane] - remembered.energy[1]) / remembered.energy[2]
     remembered.energy[0] = max(remembered.energy[0], ratio)
-    return _show(law, physics, state, seen, remembered, reference, int(block[DONE, lane]), 0)
+    return _show(model, law, physics, state, seen, remembered, reference, int(block[DONE, lane]), 0)
 
 
 @njit(cache=True, nogil=True)
@@ -320,7 +328,7 @@ def _flies_on(
         if flown == 0:
             return True
         schemes.flight(scheme, model, physics, state, seen.step_size, flown)
-        if not _show(law, physics, state, seen, remembered, reference, done[0] + flown, flown):
+        if not _show(model, law, physics, state, seen, remembered, reference, done[0] + flown, flown):
             return False
         done[0] += flown
     return False

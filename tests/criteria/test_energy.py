@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from stiffdice import watch
+from stiffdice.contact import LAWS
 from stiffdice.criteria import energy
-from stiffdice.scene import from_mapping
+from stiffdice.models import MODELS
+from stiffdice.scene import Scene, from_mapping
 from stiffdice.simulate import simulate
 from stiffdice.state import physics_of, start_of
+from stiffdice.verdict import Verdict
 from stiffdice.watch import SIGHT
 
 GATED = {"contact": "gated", "friction": 0}
@@ -36,10 +39,11 @@ def test_a_flight_neither_gains_nor_loses(model, steps):
     scene = from_mapping({"ground": GATED, "launch": launch, "duration": 4.0})
     states = simulate(scene, model=model, steps=steps, every=1).trajectory.state
     physics, sight, slots = physics_of(scene), np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
+    tags = MODELS[model], LAWS["gated"]
     for first, second in ((0, steps), (steps, 0), (steps // 2, 1), (steps // 4, steps // 2)):
-        watch.start(sight[0], physics, states[first], 4.0 / steps, 0.0, 0.5)
-        energy.start(slots, sight[0], physics, states[first])
-        assert energy.observe(slots, sight[0], None, physics, states[second], None)[0] == pytest.approx(1, abs=1e-12)
+        watch.start(sight[0], physics, states[first], 4.0 / steps, 0.0, 0.5, 0.0)
+        energy.start(slots, sight[0], *tags, physics, states[first])
+        assert energy.observe(slots, sight[0], *tags, physics, states[second], None)[0] == pytest.approx(1, abs=1e-12)
 
 
 def airborne_energy(scene, kept, steps):
@@ -75,19 +79,52 @@ def test_it_counts_only_the_air():
     scene = from_mapping({})
     physics, state = physics_of(scene), start_of(scene, "tumbling")
     sight, slots = np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
-    watch.start(sight[0], physics, state[0], 1e-3, 0.0, 0.5)
-    energy.start(slots, sight[0], physics, state[0])
+    watch.start(sight[0], physics, state[0], 1e-3, 0.0, 0.5, 0.0)
+    tags = MODELS["tumbling"], LAWS["ungated"]
+    energy.start(slots, sight[0], *tags, physics, state[0])
     state["velocity"] *= 10
     for flight, expected in ((0, 1), (1, 50)):
         sight["flight"] = flight
-        measure, settled = energy.observe(slots, sight[0], None, physics, state[0], None)
+        measure, settled = energy.observe(slots, sight[0], *tags, physics, state[0], None)
         assert measure == pytest.approx(expected, rel=0.1)
         assert not settled
 
 
-def test_a_cube_that_never_leaves_the_ground_has_no_ratio():
+def test_a_cube_that_never_leaves_the_ground_is_judged_by_its_mechanical_energy():
     lying = {"position": [0, 0, 0.5], "velocity": [0, 0, 0]}
-    assert ratio(ground=GATED | {"damping": 10, "stiffness": 100}, launch=lying) == 0
+    assert ratio(ground=GATED | {"damping": 10, "stiffness": 100}, launch=lying) == 1
+    swinging = {"position": [0, 0, 0.49], "velocity": [0, 0, 0]}  # by half its sag, undamped
+    ground = GATED | {"damping": 0, "friction": 0, "stiffness": 200}
+    assert ratio(3_000, "sliding", 1, ground=ground, launch=swinging) == pytest.approx(1, abs=3e-3)
+    assert ratio(30_000, "sliding", 1, ground=ground, launch=swinging) == pytest.approx(1, abs=1e-5)
+
+
+@pytest.mark.parametrize("every", [None, 1])
+@pytest.mark.parametrize("height", [0.4, 0.5, 0.53], ids=["pressed", "lying", "dropped"])
+def test_friction_that_speeds_a_cube_up_on_the_ground_is_seen(height, every):
+    """A push of regularised friction in one step is up to mu h times the normal force: far beyond the speed here."""
+    ground = GATED | {"stiffness": 100.0, "damping": 5.0, "friction": 10.0}
+    keys = {"ground": ground, "launch": {"position": [0, 0, height], "velocity": [1, 0, 0]}}
+    slides = simulate(from_mapping(keys), model="sliding", steps=500, every=1).trajectory.state["velocity"][:, 0]
+    assert np.abs(slides).max() > 1.3
+    assert ratio(500, "sliding", every, **keys) > 1.05
+
+
+def test_a_cube_that_ends_on_the_ground_faster_than_its_energy_allows_is_seen():
+    """On the last of these steps it lands, and friction throws it along; nothing in the air tells."""
+    ground = GATED | {"stiffness": 100.0, "damping": 5.0, "friction": 10.0}
+    keys = {"ground": ground, "launch": {"position": [0, 0, 0.6], "velocity": [1, 0, 0]}}
+    states = simulate(from_mapping(keys), model="sliding", steps=500, every=1).trajectory.state
+    fastest = int(np.abs(states["velocity"][:, 0]).argmax())
+    shorter = keys | {"duration": 10 * fastest / 500}
+    assert states["position"][fastest, 2] < Scene().cube.side / 2
+    for every in (None, 1):
+        assert ratio(fastest, "sliding", every, **shorter) > 5
+
+
+def test_an_energy_beyond_doubles_is_no_pass():
+    run = simulate(from_mapping({"launch": {"velocity": [0, 0, 1e160]}}), model="sliding", steps=100)
+    assert Verdict(run.verdict[0]) == Verdict.LEFT_NUMERIC_RANGE
 
 
 def test_a_launch_from_inside_the_ground_is_measured_with_its_springs_energy():

@@ -27,6 +27,6 @@ def test_it_is_one_where_a_number_left_the_range_of_doubles(keys, measure, every
 def test_no_part_of_a_state_escapes(part, axis, value):
     state, slots = np.zeros(1, STATE), np.zeros(finite.SLOTS)
     physics = physics_of(Scene())
-    assert finite.observe(slots, None, None, physics, state[0], None) == (0.0, False)
+    assert finite.observe(slots, None, None, None, physics, state[0], None) == (0.0, False)
     state[part][(0, 0, axis) if part == "node_offset" else (0, axis)] = value
-    assert finite.observe(slots, None, None, physics, state[0], None)[0] == 1.0
+    assert finite.observe(slots, None, None, None, physics, state[0], None)[0] == 1.0

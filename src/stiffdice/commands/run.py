@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import shlex
+import sys
 
 from stiffdice.commands import changes, numbers
 from stiffdice.errors import InputError
@@ -81,20 +83,27 @@ def _run(options: argparse.Namespace) -> None:
         raise InputError(f"{target}: is the scene itself; name another file for the output")
 
     # These take about a second to import; bad input is told before.
-    from stiffdice import ledger, schemes, simulators
+    from stiffdice import ledger, requirement, run_text, schemes, simulators
     from stiffdice.io.layout import run_dataset
     from stiffdice.io.write import write_dataset
     from stiffdice.progress import Progress
-    from stiffdice.requirement import AUTO
     from stiffdice.simulate import default_every, simulate
-    from stiffdice.verdict import Verdict
 
     scheme = simulators.scheme_of(options.simulator, options.scheme)
     if options.ledger:
         checks.choice("--ledger: simulator", options.simulator, [simulators.OURS])
         checks.choice("--ledger: scheme", scheme, ledger.BOOKED)
-    every = default_every(steps) if options.every is None else numbers.whole("--every", options.every)
+    every = (
+        default_every(steps)
+        if options.every is None
+        else checks.count("every", numbers.whole("--every", options.every), at_most=steps)
+    )
     tolerance = schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance)
+    method = scheme if options.simulator == simulators.OURS else ""
+    model, _ = requirement.chosen(options.model, [scene], scene.duration / steps)
+    simulators.check_fit(options.simulator, scheme, scene, model)
+    for line in run_text.doubts(scene, model, method, steps):
+        print(f"stiffdice: note: {line}", file=sys.stderr)
     with Progress() as progress:
         run = simulate(
             scene,
@@ -111,6 +120,14 @@ def _run(options: argparse.Namespace) -> None:
         books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
-    if options.model == AUTO:
+    if options.model == requirement.AUTO:
         print(run.model_reason)
-    print(f"{target}: {Verdict(run.verdict[0]).sentence}")
+    print("\n".join(run_text.lines(run, str(target), _advise(options))))
+
+
+def _advise(options: argparse.Namespace) -> str:
+    """Return the command that says how accurate such a run is."""
+    words = ["stiffdice", "advise", options.scene]
+    words += [] if options.preset is None else ["--preset", options.preset]
+    words += [word for override in options.overrides for word in ("--set", override)]
+    return shlex.join([*words, "--error", "1%"])

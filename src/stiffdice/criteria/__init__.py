@@ -91,7 +91,7 @@ def _starting(names: list[str]) -> Any:
     if not names:
 
         @njit
-        def nothing(memory: Any, sight: Any, physics: Any, state: Any) -> None:
+        def nothing(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
             pass
 
         return nothing
@@ -99,9 +99,9 @@ def _starting(names: list[str]) -> Any:
     this, others = CRITERIA[name].start, _starting(names[1:])
 
     @njit
-    def start(memory: Any, sight: Any, physics: Any, state: Any) -> None:
-        this(memory[name], sight, physics, state)
-        others(memory, sight, physics, state)
+    def start(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
+        this(memory[name], sight, model, law, physics, state)
+        others(memory, sight, model, law, physics, state)
 
     return start
 
@@ -115,7 +115,9 @@ def _observing(names: list[str]) -> Any:
     if not names:
 
         @njit
-        def nothing(memory: Any, step: Any, sight: Any, law: Any, physics: Any, state: Any, ref: Any) -> int:
+        def nothing(
+            memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any
+        ) -> int:
             return 0
 
         return nothing
@@ -123,20 +125,20 @@ def _observing(names: list[str]) -> Any:
     this, others = CRITERIA[name].observe, _observing(names[1:])
 
     @njit
-    def observe(memory: Any, step: Any, sight: Any, law: Any, physics: Any, state: Any, ref: Any) -> int:
-        measure, settled = this(memory[name], sight, law, physics, state, ref)
+    def observe(memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any) -> int:
+        measure, settled = this(memory[name], sight, model, law, physics, state, ref)
         newly = 0
         if memory.decided[k] == 0 and (settled or measure > memory.limits[k]):
             memory.decided[k] = step
             newly = 1 if memory.limits[k] < np.inf else 0
-        return newly + others(memory, step, sight, law, physics, state, ref)
+        return newly + others(memory, step, sight, model, law, physics, state, ref)
 
     return observe
 
 
-# (memory, sight, physics, state): begin to watch a run that stands at its launch.
+# (memory, sight, model, law, physics, state): begin to watch a run that stands at its launch.
 start = _starting(list(CRITERIA))
 
-# (memory, step, sight, law, physics, state, reference) -> how many of the criteria that have a limit this step decides.
-# A criterion is decided when it fails, or can fail no more.
+# (memory, step, sight, model, law, physics, state, reference) -> how many of the criteria that have a limit this step
+# decides. A criterion is decided when it fails, or can fail no more.
 observe = _observing(list(CRITERIA))

@@ -1,9 +1,10 @@
 """`apex`: no rebound goes higher than the one before it.
 
 Heights stand for the energy of the motion that bounces: m v²/2 at lift-off, along the ground's normal, so that friction
-cannot hide a gain by draining the sliding. The first rebound is measured against what the launch reaches. Hops lower
-than ten times the sag of a cube at rest are its settling: a flight counts as at least that high. A cube that tumbles
-may rightly bounce higher than before, paid for by its spin.
+cannot hide a gain by draining the sliding. The first rebound is measured against what the launch reaches. A flight
+counts as at least `hop_height` high, and as ten times the sag of a cube at rest: lower hops are its settling. Without
+a height for them, a hop of a millimetre after minutes decides as much as the first rebound, and the number of steps
+that passes depends on the duration. A cube that tumbles may rightly bounce higher than before, paid for by its spin.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 
 from stiffdice import energy
 from stiffdice.compiled import njit
+from stiffdice.scene import Scene
 from stiffdice.state import Physics
 from stiffdice.verdict import Verdict
 from stiffdice.watch import settled
@@ -24,9 +26,17 @@ FAILURE = Verdict.APEX_ROSE
 BY_DEFAULT, FOR_TURNING = True, False
 SLOTS = 2  # largest ratio so far, energy of the last flight over the mass [J/kg]
 
+# Rebounds lower than this part of the cube's radius are not judged, unless a height is given.
+HOP = 0.1
+
+
+def default_hop_height(scene: Scene) -> float:
+    """Return the height [m] below which rebounds are not judged where none is given."""
+    return HOP * scene.cube.radius
+
 
 @njit
-def start(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
+def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
     slots[0] = 0.0
     slope = sight.speed - sight.lag * sight.step_size * sight.pull
@@ -35,11 +45,13 @@ def start(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
 
 
 @njit
-def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, reference: Any) -> tuple[float, bool]:
+def observe(
+    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
+) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.lifted > 0.0:
         now = sight.speed_out * sight.speed_out / 2
-        before = max(slots[1], settled(sight))
+        before = max(slots[1], settled(sight), sight.pull * sight.hop_height)
         if before > 0.0:
             slots[0] = max(slots[0], now / before)
         slots[1] = now

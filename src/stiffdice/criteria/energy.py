@@ -1,27 +1,35 @@
-"""`energy`: in the air the cube never has more energy than at its launch.
+"""`energy`: in the air the cube never has more energy than at its launch, nor on the ground if it never leaves that.
 
 In the air the springs hold nothing, so kinetic energy + m g z is all there is, and neither contact law can add to it.
 The velocity is taken at the step's place, so that free flight keeps this energy under any scheme (symplectic Euler
 keeps E − m g h w/2 otherwise). What it started with is counted from the cube at rest on the ground: a metre of height
 that it can never give back would dilute every gain.
+
+In a bounce the energy of a scheme swings by a part of (ωh)² of it, and comes back; so contact is not looked at, but in
+two cases. A cube that was on the ground at its launch is judged by its mechanical energy, with the springs', until it
+leaves the ground. A cube that is on the ground at the end has at least the energy of its motion along the ground, of
+its spin, and m g z.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from stiffdice import energy
 from stiffdice.compiled import njit
+from stiffdice.contact import speed_of
 from stiffdice.state import Physics
 from stiffdice.verdict import Verdict
 
 MEASURE = "energy_ratio"
-LONG_NAME = "largest airborne energy over the energy at launch, both above that of rest"
+LONG_NAME = "largest energy over that of the launch, in the air or of a cube that never flew"
 MEANING = "airborne energy never above (1 + tolerance) of the launch's"
 BASE, TOLERANCE = 1.0, 0.05
 FAILURE = Verdict.ENERGY_GREW
 BY_DEFAULT, FOR_TURNING = True, True
-SLOTS = 3  # largest ratio so far, energy at launch [J], what a gain is measured by [J]
+# Largest ratio so far, energy at launch [J], what a gain is measured by [J], 1 as long as it was never in the air.
+SLOTS = 4
 
 
 # Of the energies: as much as a flight of many steps may add by it, and far below any gain that matters.
@@ -29,25 +37,40 @@ _ROUND_OFF = 1e-12
 
 
 @njit
-def start(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
+def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
-    elastic = energy.elastic(physics, state)
-    slots[1] = _flying(sight, physics, state) + elastic
+    grounded = sight.clearance <= 0.0
+    slots[3] = 1.0 if grounded else 0.0
+    slots[1] = _mechanical(sight, model, law, physics, state) if grounded else _flying(sight, physics, state)
     # On a slope the zero of m g z means nothing: height counts from the ground right below.
     weight = physics.mass * physics.gravity * abs(physics.nz)
     high = weight * (max(0.0, sight.height - physics.side / 2) + sight.sag / 2)
-    slots[2] = energy.kinetic(physics, state) + elastic + high
+    slots[2] = energy.kinetic(physics, state) + energy.elastic(physics, state) + high
     if slots[2] <= 0.0:
         slots[2] = 1.0
-    slots[0] = 1.0 if sight.clearance > 0.0 else 0.0
+    # Beyond doubles no gain can be measured, and none shall pass.
+    slots[0] = 1.0 if math.isfinite(slots[1]) and math.isfinite(slots[2]) else math.nan
 
 
 @njit
-def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, reference: Any) -> tuple[float, bool]:
+def observe(
+    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
+) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.flight > 0.0:
-        slots[0] = max(slots[0], 1.0 + (_flying(sight, physics, state) - slots[1]) / slots[2])
+        slots[3] = 0.0
+        _count(slots, _flying(sight, physics, state))
+    elif slots[3] > 0.0:
+        _count(slots, _mechanical(sight, model, law, physics, state))
     return slots[0], sight.held > 0.0
+
+
+@njit
+def finish(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
+    """Count the last state, if it is on the ground, by the part of its energy that no spring swings with."""
+    if sight.clearance <= 0.0:
+        along = energy.kinetic(physics, state) - 0.5 * physics.mass * speed_of(physics, state) ** 2
+        _count(slots, along + energy.potential(physics, state))
 
 
 @njit
@@ -57,8 +80,23 @@ def ceiling(slots: Any) -> float:
 
 
 @njit
+def _count(slots: Any, now: float) -> None:
+    ratio = 1.0 + (now - slots[1]) / slots[2]
+    slots[0] = max(slots[0], ratio)
+
+
+@njit
 def _flying(sight: Any, physics: Physics, state: Any) -> float:
     """Return kinetic energy + m g z [J], the velocity taken at the place."""
     behind = sight.lag * sight.step_size * physics.gravity
     moving = physics.mass * behind * (behind / 2 - state.velocity[2])
     return energy.kinetic(physics, state) + moving + energy.potential(physics, state)
+
+
+@njit
+def _mechanical(sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> float:
+    """Return kinetic energy + m g z + the springs' [J], the velocity taken at the place."""
+    behind = sight.lag * sight.step_size
+    return energy.kinetic_at_place(model, law, physics, state, behind) + (
+        energy.potential(physics, state) + energy.elastic(physics, state)
+    )

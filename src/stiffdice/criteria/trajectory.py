@@ -20,13 +20,15 @@ SLOTS = 1  # the measure
 
 
 @njit
-def start(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
+def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
     slots[0] = 0.0
 
 
 @njit
-def observe(slots: Any, sight: Any, law: Any, physics: Physics, state: Any, reference: Any) -> tuple[float, bool]:
+def observe(
+    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
+) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if reference.horizon < 0.0:
         slots[0] = math.nan

@@ -21,6 +21,7 @@ from stiffdice.contact import LAWS
 from stiffdice.errors import InputError
 from stiffdice.io import layout
 from stiffdice.io.enums import enum_attributes
+from stiffdice.limits import fewest_steps, half_turn_steps
 from stiffdice.models import MODELS
 from stiffdice.scene import Scene
 from stiffdice.simulate import Run, simulate
@@ -136,7 +137,7 @@ AXES: dict[str, Axis] = {
 STEPS = tuple(np.logspace(0, 9, 20).round().tolist())
 
 # What theory says of the steps a value needs, or may have: `limit_steps`.
-LIMITS = ("bounce", "drag", "turn", "stall")
+LIMITS = ("contact", "drag", "turn", "stall")
 
 
 def measure(
@@ -199,37 +200,18 @@ def _only_takes(scene: Scene, steps: int) -> bool:
     return 2 * ground.friction * h * push <= math.hypot(along_x, along_y)
 
 
-def _limits(scene: Scene, law: str, model: str) -> list[float]:
+def _limits(scene: Scene, model: str) -> list[float]:
     """Return the steps at each of LIMITS; not-a-number where it does not apply.
 
-    bounce: a flat landing on four nodes, (ωh)² + 2(c/m)h = 4 with c = 4 D (`theory.stability_limit`). drag: all eight
-    nodes of a falling cube, explicit damping, 8 D h/m = 2. turn: half a turn in a step. stall: more steps than these
-    move the launch by less than half a unit in the last place of its height.
+    contact, drag: `limits.fewest_steps`. turn: half a turn in a step. stall: more steps than these move the launch by
+    less than half a unit in the last place of its height.
     """
-    mass, damping, duration = scene.cube.mass, scene.ground.damping, scene.duration
-    omega, rate = theory.contact_frequency(scene.ground.stiffness, mass), 4 * damping / mass
-    bounce = duration * (rate + math.hypot(rate, 2 * omega)) / 4
-    drag = duration * rate if law == "ungated" else math.nan
-    turn = duration * math.hypot(*scene.launch.spin) / scene.cube.moment_of_inertia / math.pi
+    contact, drag = fewest_steps(scene, model, SCHEME)
+    turn = float(half_turn_steps(scene, np.array(scene.launch.spin))) if model in TURNING else 0.0
     normal = np.array(scene.ground.normal)
     height, speed = abs(normal @ scene.launch.position), abs(normal @ scene.launch.velocity)
-    stall = 2 * speed * duration / np.spacing(height)
-    return [part if part > 0 else math.nan for part in (bounce, drag, turn if model in TURNING else 0.0, float(stall))]
-
-
-def _touched(run: Run) -> bool:
-    """Return whether a run met the ground, or began in it."""
-    return bool(run.touchdown_phase[0] >= 0) or _clearance(run.scene) <= 0
-
-
-def _resolved(verdicts: Array, touched: Array, steps: Sequence[int], limits: Array) -> Array:
-    """Return the verdicts, `unresolved` where a run passed with steps too long for what it met.
-
-    That is: a bounce for a run that touched the ground, the drag for any (`ungated`), half a turn for one that turns.
-    """
-    fewest = np.nan_to_num(limits[..., :3])[:, :, None, :] * np.stack([touched, *[np.ones_like(touched)] * 2], axis=-1)
-    long = np.array(steps)[None, None, :] < fewest.max(axis=-1)
-    return np.where(long & (verdicts == Verdict.PASSED), Verdict.UNRESOLVED, verdicts).astype(np.int8)
+    stall = 2 * speed * scene.duration / np.spacing(height)
+    return [part if part > 0 else math.nan for part in (contact, drag, turn, float(stall))]
 
 
 def _dataset(
@@ -248,11 +230,9 @@ def _dataset(
         return np.array([[[pick(run) for run in row] for row in part] for part in runs], kind)
 
     omega_h = [[theory.omega_h(there, count) for count in steps] for there in placed[0]]
-    limits = np.array([[_limits(there, law, model) for there in row] for law, row in zip(LAWS, placed, strict=True)])
-    verdicts = of_runs(np.int8, lambda run: run.verdict[0])
-    touched = of_runs(bool, _touched)
+    limits = np.array([[_limits(there, model) for there in row] for row in placed])
     variables: dict[str, Any] = {
-        "verdict": (grid, _resolved(verdicts, touched, steps, limits), layout.VERDICT_ATTRIBUTES),
+        "verdict": (grid, of_runs(np.int8, lambda run: run.verdict[0]), layout.VERDICT_ATTRIBUTES),
         "steps_done": (grid, of_runs(np.int64, lambda run: run.steps_done[0]), layout.STEPS_DONE_ATTRIBUTES),
         "steps_computed": (
             grid,
@@ -263,7 +243,10 @@ def _dataset(
         "limit_steps": (
             ("limit", *grid[:2]),
             np.moveaxis(limits, -1, 0),
-            {"long_name": "steps at a limit by theory: fewest for bounce, drag and turn, most for stall", "units": "1"},
+            {
+                "long_name": "steps at a limit by theory: fewest for contact, drag, turn, most for stall",
+                "units": "1",
+            },
         ),
     } | {
         name: (grid, of_runs(float, _measure_of(name)), layout.MEASURE_ATTRIBUTES[name])

@@ -28,7 +28,7 @@ _NAMES = {
     "start": "start [by name]",
 }
 _LIMIT_LOOKS: dict[str, dict[str, Any]] = {
-    "bounce": {"linestyle": "-", "label": "theory: flat bounce, ωh = 2(√(1 + ζ²) − ζ)"},
+    "contact": {"linestyle": "-", "label": "theory: fastest contact, ωh = 2(√(1 + ζ²) − ζ)"},
     "drag": {"linestyle": "--", "label": "theory: drag of a falling cube (ungated), 8 D h/m = 2"},
     "turn": {"linestyle": "-.", "label": "theory: half a turn in a step"},
     "stall": {"linestyle": ":", "label": "theory: a step at launch is half a unit in the last place of z"},

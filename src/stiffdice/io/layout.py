@@ -14,7 +14,7 @@ import xarray as xr
 
 from stiffdice import __version__, contact, schemes, simulators, theory
 from stiffdice.contact import LAWS
-from stiffdice.criteria import CRITERIA
+from stiffdice.criteria import CRITERIA, criteria_of
 from stiffdice.cube import SIGNS
 from stiffdice.io import FORMAT_VERSION
 from stiffdice.io.enums import enum_attributes
@@ -26,6 +26,7 @@ from stiffdice.verdict import Verdict
 
 CONTACT_ATTRIBUTES = enum_attributes("contact law", list(LAWS))
 VERDICT_ATTRIBUTES = enum_attributes("verdict", [verdict.name.lower() for verdict in Verdict])
+ENDING_ATTRIBUTES = VERDICT_ATTRIBUTES | {"long_name": "how the run ended whatever it was asked, passed if well"}
 # What numbers and files depend on besides our code.
 _LIBRARIES = ("numpy", "numba", "llvmlite", "h5py", "h5netcdf", "xarray")
 
@@ -85,6 +86,7 @@ def run_variables(members: int) -> dict[str, Any]:
     return {name: (table, numbers, attributes) for name, attributes in MEASURE_ATTRIBUTES.items()} | {
         "touchdown_phase": (table, numbers, PHASE_ATTRIBUTES),
         "verdict": (table, np.zeros((1, members), np.int8), VERDICT_ATTRIBUTES),
+        "ending": (table, np.zeros((1, members), np.int8), ENDING_ATTRIBUTES),
         "steps_done": (table, counts, STEPS_DONE_ATTRIBUTES),
         "steps_computed": (table, counts, STEPS_COMPUTED_ATTRIBUTES),
         "decided": ((*table, "criterion"), np.zeros((1, members, len(CRITERIA)), np.int64), DECIDED_ATTRIBUTES),
@@ -146,10 +148,13 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         nodes = np.arange(1, len(SIGNS) + 1, dtype=np.int8)
         coordinates["node"] = ("node", nodes, {"long_name": "node, numbered as in cube.m", "units": "1"})
     variables |= {
-        name: ((), value[0], MEASURE_ATTRIBUTES[name]) for name, value in run.measures.items() if not np.isnan(value[0])
+        part.MEASURE: ((), run.measures[part.MEASURE][0], MEASURE_ATTRIBUTES[part.MEASURE])
+        for part in criteria_of(run.model).values()
+        if not np.isnan(run.measures[part.MEASURE][0])
     }
     variables["touchdown_phase"] = ((), run.touchdown_phase[0], PHASE_ATTRIBUTES)
     variables["verdict"] = ((), run.verdict[0], VERDICT_ATTRIBUTES)
+    variables["ending"] = ((), run.ending[0], ENDING_ATTRIBUTES)
     variables["steps_done"] = ((), run.steps_done[0], STEPS_DONE_ATTRIBUTES)
     variables["evaluations"] = ((), run.evaluations[0], EVALUATIONS_ATTRIBUTES)
     code = "stiffdice.simulate", *simulators.code_of(run.simulator)
@@ -164,6 +169,8 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         "omega_h": theory.omega_h(run.scene, run.steps),
         "angular_momentum_at_launch": np.array(run.scene.launch.spin),
         "criteria": criteria_text(run.tolerances),
+        "hop_height": run.hop_height,
+        "hop_height_units": "m",
         "verdict_text": Verdict(run.verdict[0]).sentence,
     }
     return xr.Dataset(variables, coordinates, attributes)
@@ -189,6 +196,9 @@ def _trajectory_variables(trajectory: Trajectory) -> dict[str, Any]:
         "elastic_energy": (trajectory.elastic_energy, "energy in the ground's springs, S d²/2 per node"),
         "energy_paper": (trajectory.energy_paper, "kinetic and potential energy, the paper's total"),
     }
+    if trajectory.mechanical_energy is not None:
+        text = "kinetic, potential and elastic energy, the velocity taken at the time of the place"
+        energies["mechanical_energy"] = trajectory.mechanical_energy, text
     return {
         "step": ("time", trajectory.step, {"long_name": "number of time steps done", "units": "1"}),
         "position": (place, trajectory.state["position"], {"long_name": "centre of mass", "units": "m"}),

@@ -71,6 +71,7 @@ _OF_RUNS = {
     "scene_note": Attribute(TEXT, RECOMMENDED),
     "criteria": Attribute(TEXT, OPTIONAL),
     "horizon": Attribute(NUMBER, OPTIONAL),
+    "hop_height": Attribute(NUMBER, RECOMMENDED),
 }
 _JUDGED = {
     "members": Attribute(WHOLE),
@@ -99,6 +100,7 @@ KINDS: dict[str, Kind] = {
             "omega_h": Attribute(NUMBER),
             "criteria": Attribute(TEXT),
             "tolerance": Attribute(NUMBER, RECOMMENDED),
+            "hop_height": Attribute(NUMBER, RECOMMENDED),
             "verdict_text": Attribute(TEXT, RECOMMENDED),
         },
         {
@@ -111,7 +113,9 @@ KINDS: dict[str, Kind] = {
             "potential_energy": Variable(_TIME, "f8", "J"),
             "elastic_energy": Variable(_TIME, "f8", "J"),
             "energy_paper": Variable(_TIME, "f8", "J"),
+            "mechanical_energy": Variable(_TIME, "f8", "J", RECOMMENDED),
             "verdict": Variable((), "i1"),
+            "ending": Variable((), "i1", need=RECOMMENDED),
             "steps_done": Variable((), "i8"),
             "out_of_range": Variable((), "f8"),
             "evaluations": Variable((), "i8", need=RECOMMENDED),
@@ -133,6 +137,7 @@ KINDS: dict[str, Kind] = {
             "trajectory_error": Variable(_RUN, "f8"),
             "touchdown_phase": Variable(_RUN, "f8"),
             "verdict": Variable(_RUN, "i1"),
+            "ending": Variable(_RUN, "i1", need=RECOMMENDED),
             "steps_done": Variable(_RUN, "i8"),
             "steps_computed": Variable(_RUN, "i8"),
             "decided": Variable((*_RUN, "criterion"), "i8"),

@@ -313,7 +313,8 @@ def _measures(run: _Run) -> dict[str, float]:
 def _judged(run: _Run) -> list[str]:
     measures, verdict = _measures(run), int(run.dataset["verdict"])
     found = verdicts.of_measures({name: value for name, value in measures.items() if name in run.dataset})
-    found += verdicts.problems(verdict, measures, verdicts.limits_in(str(run.dataset.attrs["criteria"])))
+    ended = run.dataset["ending"].values if "ending" in run.dataset else None
+    found += verdicts.problems(verdict, ended, measures, verdicts.limits_in(str(run.dataset.attrs["criteria"])))
     found += verdicts.early(run.steps_done, run.steps, verdict)
     stalled = _stalled(run)
     found += outside(

@@ -36,7 +36,7 @@ def of_runs(dataset: xr.Dataset) -> list[str]:
     measures = _measures(dataset)
     found += verdicts.of_measures(measures)
     limits = _limits(dataset)
-    found += verdicts.problems(verdict, measures, limits)
+    found += verdicts.problems(verdict, dataset["ending"].values if "ending" in dataset else None, measures, limits)
     return found + _early(dataset, measures, limits)
 
 

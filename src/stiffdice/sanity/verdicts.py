@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.criteria import CRITERIA
-from stiffdice.judge import judge
+from stiffdice.judge import ending, judge
 from stiffdice.sanity.bounds import outside
 from stiffdice.verdict import SEVERITY, Verdict
 
 # How a run may have ended that its measures do not show.
-ENDINGS = (Verdict.SANK, Verdict.STALLED, Verdict.UNDECIDED)
+ENDINGS = (Verdict.UNRESOLVED, Verdict.SANK, Verdict.STALLED, Verdict.UNDECIDED)
 
 _GRAVITY = np.array([SEVERITY.index(verdict) for verdict in Verdict])
 
@@ -52,24 +52,30 @@ def of_measures(measures: Mapping[str, npt.ArrayLike]) -> list[str]:
     return found
 
 
-def problems(verdict: npt.ArrayLike, measures: Mapping[str, npt.ArrayLike], limits: Limits | None) -> list[str]:
-    """Return a line for every verdict that the measures do not give, all of one shape.
+def problems(
+    verdict: npt.ArrayLike, endings: npt.ArrayLike | None, measures: Mapping[str, npt.ArrayLike], limits: Limits | None
+) -> list[str]:
+    """Return a line for every verdict that measures and ending do not give, all of one shape.
 
-    limits: None if it is not known which criteria were asked; then only what judges every run is looked at.
+    endings: None in files of before they were stored. limits: None if it is not known which criteria were asked; then
+    only what judges every run is looked at.
     """
     stored = np.asarray(verdict)
+    ended = stored if endings is None else np.asarray(endings)
+    right = ending(measures, {name: ended == name for name in ENDINGS})
+    found = [] if endings is None else outside("ending", ended, ended == right, "what the measures say, or graver")
     if limits is None:
-        always = judge({}, measures, {})
-        fine = np.where(always == Verdict.PASSED, ~np.isin(stored, _ALWAYS), stored == always)
-        found = outside("verdict", stored, fine, "blew_up and left_numeric_range where the measures say so, only there")
+        well = (right == Verdict.PASSED) | (right == Verdict.UNRESOLVED)
+        none = ~np.isin(stored, [Verdict.PASSED, *_ALWAYS]) | (stored == right)
+        fine = np.where(well, none, stored == right)
+        found += outside("verdict", stored, fine, "how the run ended, if that is graver than any criterion")
         return found + _sorted_by(stored, measures)
-    strict, lenient = (judge(tolerances, measures, {}) for tolerances in limits)
-    graver = np.isin(stored, ENDINGS) & (_GRAVITY[stored] > _GRAVITY[lenient])
-    fine = (stored == strict) | (stored == lenient) | graver
-    return outside("verdict", stored, fine, _allowed(stored, strict, fine))
+    strict, lenient = (judge(tolerances, measures, right) for tolerances in limits)
+    fine = (stored == strict) | (stored == lenient)
+    return found + outside("verdict", stored, fine, _allowed(stored, strict, fine))
 
 
-_ALWAYS = (Verdict.BLEW_UP, Verdict.LEFT_NUMERIC_RANGE)
+_ALWAYS = (*ENDINGS, Verdict.BLEW_UP, Verdict.LEFT_NUMERIC_RANGE)
 
 
 def _sorted_by(stored: npt.NDArray[np.int8], measures: Mapping[str, npt.ArrayLike]) -> list[str]:
@@ -88,7 +94,7 @@ def _allowed(stored: npt.NDArray[np.int8], right: npt.NDArray[np.int8], fine: np
     """Say what the first verdict that is wrong should be."""
     wrong = np.argwhere(~fine)
     first = int(right[tuple(wrong[0])]) if len(wrong) else 0
-    return f"{first}, {Verdict(first).name.lower()}, as its measures say, or an ending graver than that"
+    return f"{first}, {Verdict(first).name.lower()}, as its measures and its ending say"
 
 
 def early(

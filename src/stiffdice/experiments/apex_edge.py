@@ -1,0 +1,161 @@
+"""Where `apex` begins to hold, by the height from which rebounds count and by the duration of the run.
+
+Under the `ungated` law a falling cube is braked in the air. A rebound from a height H returns, solved exactly, to
+R(H) H: the lower H is, the shorter is the fall and the less it costs. Symplectic Euler multiplies the energy of a
+bounce by up to `theory.largest_gain`, so that a rebound goes higher than the one before as soon as R(H) · gain exceeds
+1 + tolerance. So the lowest rebounds that count decide; and where nothing says which count, the duration decides, as it
+sets how low they become before the end. Under the `gated` law R hardly depends on H: height and duration do not matter.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffdice import checks, exact, theory
+from stiffdice.contact import LAWS
+from stiffdice.criteria import apex
+from stiffdice.ensemble import phased, turned
+from stiffdice.errors import InputError
+from stiffdice.io import layout
+from stiffdice.scene import Scene
+from stiffdice.simulate import simulate
+from stiffdice.state import Array
+
+MODEL, SCHEME = "sliding", "symplectic_euler"
+
+# Of the ωh at which the gain is looked at, evenly in the logarithm: the gain's own teeth are 1/n apart.
+_FINE = 4000
+
+
+def measure(
+    scene: Scene,
+    *,
+    hop_height: Sequence[float] = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3),
+    duration: Sequence[float] = (5.0, 10.0, 20.0, 40.0),
+    omega_h: Sequence[float] = (0.25, 1.95),
+    count: int = 160,
+    members: int = 16,
+) -> xr.Dataset:
+    """Return the edge of `apex` in ωh, dimensions contact, duration and hop_height, and the predicted one.
+
+    hop_height [m]: lower rebounds are not judged. duration [s]: of the runs. omega_h: ends of the scan; count: values
+    in it, evenly in their logarithm. members: launches at each. `last_fail` is the smallest ωh, so the most steps, at
+    which a member fails; not-a-number where none does.
+
+    Raises InputError for a number out of range.
+    """
+    heights = [checks.number("hop_height", value, "m", at_least=0) for value in hop_height]
+    durations = [checks.number("duration", value, "s", above=0) for value in duration]
+    ends = [checks.number("omega_h", value, "1", above=0) for value in omega_h]
+    if len(ends) != 2 or not ends[0] < ends[1] < theory.STABILITY_LIMIT:
+        raise InputError(f"omega_h = {checks.shown(list(omega_h))}: allowed are two numbers, 0 < low < high < 2 [1]")
+    scan = np.geomspace(ends[0], ends[1], checks.count("count", count, at_least=2))
+    members = checks.count("members", members)
+    edges = np.full((len(LAWS), len(durations), len(heights)), np.nan)
+    predicted = np.full((len(LAWS), len(heights)), np.nan)
+    for k, law in enumerate(LAWS):
+        ground = scene.with_ground(contact=law)
+        for i, height in enumerate(heights):
+            predicted[k, i] = prediction(ground, height)
+            for j, seconds in enumerate(durations):
+                edges[k, j, i] = _last_fail(dataclasses.replace(ground, duration=seconds), height, scan, members)
+    return _dataset(scene, heights, durations, edges, predicted, members)
+
+
+def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
+    """Return the first ωh of an ascending scan at which a member's apex rises; not-a-number if none does."""
+    asked = {"apex": apex.TOLERANCE}
+    launches = turned(scene, MODEL, members)
+    for omega_h in scan:
+        steps = round(theory.steps_for(scene, float(omega_h)))
+        spread = phased(scene, MODEL, steps, members, launches, slice(0, members))
+        run = simulate(
+            scene,
+            model=MODEL,
+            scheme=SCHEME,
+            steps=steps,
+            members=spread,
+            criteria=asked,
+            stop=asked,
+            hop_height=height,
+        )
+        if (run.measures[apex.MEASURE] > apex.BASE + apex.TOLERANCE).any():
+            return float(theory.omega_h(scene, steps))
+    return math.nan
+
+
+def prediction(scene: Scene, height: float) -> float:
+    """Return the smallest ωh [1] at which a rebound from a height [m] may go higher by more than `apex` tolerates."""
+    kept = returned(scene, height)
+    for omega_h in np.geomspace(0.01, theory.STABILITY_LIMIT * (1 - 1e-9), _FINE):
+        if kept * theory.largest_gain(float(omega_h)) > apex.BASE + apex.TOLERANCE:
+            return float(omega_h)
+    return math.nan
+
+
+def returned(scene: Scene, height: float) -> float:
+    """Return R [1]: the part of a height [m] above touch-down that a flat cube, let go there, rises to again.
+
+    Schemes aside: a fall in the drag of the contact law, and the exact restitution of the bounce. It rises freely.
+    """
+    if height == 0:
+        return 1.0
+    drag = 8 * scene.ground.damping / scene.cube.mass if scene.ground.contact == "ungated" else 0.0
+    speed = _landing_speed(scene.gravity, drag, height)
+    return (exact.restitution(scene, speed) * speed) ** 2 / (2 * scene.gravity * height)
+
+
+def _landing_speed(gravity: float, drag: float, height: float) -> float:
+    """Return the speed [m/s] after a fall from rest in v' = g − drag·v: height = −v/drag − g/drag² ln(1 − drag·v/g)."""
+    low, high = 0.0, math.sqrt(2 * gravity * height)
+    if drag == 0:
+        return high
+    high = min(high, gravity / drag)
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if _fallen(gravity, drag, middle) < height else (low, middle)
+    return low
+
+
+def _fallen(gravity: float, drag: float, speed: float) -> float:
+    """Return the height [m] of a fall from rest that ends at a speed [m/s]."""
+    part = drag * speed / gravity
+    if part < 1e-4:  # where the logarithm loses its digits, the first two terms of its series
+        return speed**2 / (2 * gravity) * (1 + 2 * part / 3)
+    return -gravity / drag**2 * (part + math.log1p(-part))
+
+
+def _dataset(
+    scene: Scene, heights: list[float], durations: list[float], edges: Array, predicted: Array, members: int
+) -> xr.Dataset:
+    variables: dict[str, Any] = {
+        "last_fail": (
+            ("contact", "duration", "hop_height"),
+            edges,
+            {"long_name": "smallest omega h of the scan at which the apex of a member rises", "units": "1"},
+        ),
+        "predicted": (
+            ("contact", "hop_height"),
+            predicted,
+            {"long_name": "smallest omega h at which a rebound from the hop height may rise", "units": "1"},
+        ),
+    }
+    coordinates: dict[str, Any] = {
+        "contact": ("contact", np.arange(len(LAWS), dtype=np.int8), layout.CONTACT_ATTRIBUTES),
+        "duration": ("duration", durations, {"long_name": "duration of the runs", "units": "s"}),
+        "hop_height": ("hop_height", heights, {"long_name": "height from which rebounds count", "units": "m"}),
+    }
+    attributes = layout.provenance_attributes(
+        "Edge of apex by hop height and duration", scene, MODEL, SCHEME, "stiffdice.experiments.apex_edge"
+    )
+    attributes |= {
+        "members": members,
+        "criteria": layout.criteria_text({"apex": apex.TOLERANCE}),
+        "scene_note": "contact law and duration are the table's, not the scene's",
+    }
+    return xr.Dataset(variables, coordinates, attributes)
