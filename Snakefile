@@ -26,6 +26,7 @@ report: "workflow/report/workflow.rst"
 
 
 onstart:
+    one_at_a_time()
     ready_for_cluster()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 from stiffdice import status, status_text, study
@@ -11,14 +12,14 @@ from stiffdice.errors import StiffdiceError
 SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
-def told(root: Path, begun: float) -> str:
-    """Return what failed in the studies of which a job has said something since `begun` [s since the epoch].
+def told(root: Path, begun: float, studies: Collection[str]) -> str:
+    """Return what failed in those of some studies of which a job has said something since `begun` [s since the epoch].
 
     root: the project. Where no job says that it failed, Snakemake's own log is all there is to name, if it began one.
     """
     os.chdir(root)  # scenes are named from here
     lines = []
-    for name in _at_work(begun):
+    for name in sorted(name for name in studies if _at_work(name, begun)):
         try:
             failed = status_text.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
         except StiffdiceError as error:
@@ -27,16 +28,19 @@ def told(root: Path, begun: float) -> str:
             lines += ["", f"what failed in {name}", failed]
     if lines:
         lines += ["", "what does not stand on that is done; the same command goes on from here"]
-    return "\n".join([*lines, *_log_of_snakemake(begun)])
+    return "\n".join([*lines, *_log_of_snakemake(begun, studies)])
 
 
-def _at_work(begun: float) -> list[str]:
-    """Return the studies with a log that was written to since."""
-    logs = (path for path in Path("results").glob("*/logs/**/*.log") if path.stat().st_mtime >= begun)
-    return sorted({path.parts[1] for path in logs})
+def _at_work(study: str, begun: float) -> bool:
+    """Return whether a log of a study was written to since."""
+    return any(path.stat().st_mtime >= begun for path in Path("results", study).glob("logs/**/*.log"))
 
 
-def _log_of_snakemake(begun: float) -> list[str]:
-    """Return where Snakemake's own log of this run is, if it has begun one."""
-    logs = [path for path in Path(".snakemake/log").glob("*.snakemake.log") if path.stat().st_mtime >= begun]
-    return [f"Snakemake's own log: {max(logs, key=lambda path: path.stat().st_mtime)}"] if logs else []
+def _log_of_snakemake(begun: float, studies: Collection[str]) -> list[str]:
+    """Return where Snakemake's own log of this run is, if it has begun one: the last that names a file of a study."""
+    found = [path for path in Path(".snakemake/log").glob("*.snakemake.log") if path.stat().st_mtime >= begun]
+    for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
+        text = path.read_text(encoding="utf-8", errors="replace")
+        if any(f"results/{study}/" in text for study in studies):
+            return [f"Snakemake's own log: {path}"]
+    return []

@@ -196,7 +196,25 @@ def tell_of_cluster():
     if on_cluster():
         import ending
 
-        print(ending.told(Path(workflow.basedir), BEGUN), file=sys.stderr)
+        print(ending.told(Path(workflow.basedir), BEGUN, studies_due()), file=sys.stderr)
+
+
+@cache
+def studies_due():
+    """Return the studies of which something is to be made, as it is when first asked."""
+    return sorted({job.wildcards.study for job in workflow.dag.needrun_jobs() if job.benchmark})
+
+
+def one_at_a_time():
+    """Lock the studies of which something is to be made; is one being made, that ends Snakemake with exit status 2."""
+    import lock
+
+    try:
+        for name in studies_due():
+            lock.hold(Path(workflow.basedir), name)
+    except lock.RunningError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 @cache
