@@ -1,4 +1,4 @@
-"""What a run that did not end well leaves to say: what failed, why, and what was not made because of it."""
+"""What a run leaves to say at its end: what to open first, or what failed, why, and what was not made because of it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
-from stiffdice import status, status_text, study
+from stiffdice.catalogue import DRAWINGS
 from stiffdice.errors import StiffdiceError
+from stiffdice.io import yaml_file
 
 SCHEMA = "workflow/schemas/study.schema.yaml"
 
@@ -17,6 +18,8 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
 
     root: the project. Where no job says that it failed, Snakemake's own log is all there is to name, if it began one.
     """
+    from stiffdice import status, status_text, study  # half a second
+
     os.chdir(root)  # scenes are named from here
     lines = []
     for name in sorted(name for name in studies if _at_work(name, begun)):
@@ -29,6 +32,23 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
     if lines:
         lines += ["", "what does not stand on that is done; the same command goes on from here"]
     return "\n".join([*lines, *_log_of_snakemake(begun, studies)])
+
+
+def open_first(root: Path, study: str) -> str:
+    """Return which of a study's figures answers its question, and where it lies; empty if none is there.
+
+    The first that shows more than single runs; else the first figure, or table. One in SVG opens in any browser.
+    """
+    plan = yaml_file.load(root / "config" / f"{study}.yaml")
+    figures, tables = plan.get("figures", {}), plan.get("tables", {})
+    answers = {name: figure for name, figure in figures.items() if DRAWINGS[figure["draw"]].given != "runs"}
+    for kind, shown in (("figures", answers | figures), ("tables", tables)):
+        for name, part in shown.items():
+            for suffix in (".svg", ".gif", ".md"):
+                path = Path("results", study, kind, f"{name}{suffix}")
+                if (root / path).is_file():
+                    return f"open first: {path} ({part['title']})"
+    return ""
 
 
 def _at_work(study: str, begun: float) -> bool:

@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # The library of this checkout, as the jobs have it.
 sys.path.insert(0, str(ROOT / "src"))
 
+import ending  # noqa: E402
 import lock  # noqa: E402
 import room  # noqa: E402
 
@@ -141,13 +142,14 @@ def main() -> int:
         print(f"stiffdice: {reason}", file=sys.stderr)
     jobs = jobs_since(begun, studies)
     if status:
-        import ending  # takes half a second, as it reads studies
-
         print(ending.told(ROOT, begun, studies), flush=True)
-    elif jobs:
+        return status
+    if jobs:
         print("\nwhere the time went")
         print(table(jobs, time.time() - begun, options.cores))
-    return status
+    for line in filter(None, (ending.open_first(ROOT, name) for name in studies)):
+        print(line)
+    return 0
 
 
 if __name__ == "__main__":
