@@ -83,4 +83,4 @@ lock: $(READY)  ## renew the lock files from requirements/*.in (needs uv on the 
 	@$(BIN)/python requirements/write_conda_env.py
 
 clean:  ## remove results (keeps .venv)
-	@find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -r {} + ; rm -rf .snakemake
+	@$(PYTHON) workflow/clean.py

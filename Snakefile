@@ -26,7 +26,9 @@ report: "workflow/report/workflow.rst"
 
 
 onstart:
+    one_at_a_time()
     ready_for_cluster()
+    tell_how_long()
 
 
 onerror:

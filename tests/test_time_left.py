@@ -34,3 +34,8 @@ def due(kind, weight=1.0, took=None, **more):
 )
 def test_time_left(jobs, cores, left):
     assert of(jobs, cores) == Left(*left, cores)
+
+
+def test_a_pace_stands_in_where_no_job_of_a_kind_has_ended():
+    jobs = [done("shard", 2, 10), due("shard", 3), due("figure", 3), due("table", 3, took=1)]
+    assert of(jobs, 1, pace=2.0) == Left(15 + 6 + 1, 0, 1)

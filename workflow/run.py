@@ -10,8 +10,6 @@ import sys
 import time
 from pathlib import Path
 
-import room
-
 STAGES = (
     *("trajectory", "experiment", "timings", "shard", "survey", "collect", "frontier"),
     *("table", "figure", "animation"),
@@ -20,6 +18,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # The library of this checkout, as the jobs have it.
 sys.path.insert(0, str(ROOT / "src"))
+
+import ending  # noqa: E402
+import lock  # noqa: E402
+import room  # noqa: E402
 
 from stiffdice.parent import end_with_parent  # noqa: E402
 from stiffdice.time_left import took  # noqa: E402
@@ -34,12 +36,30 @@ def seconds_of_simulation(log: Path) -> float:
     return float(found[1]) if found else 0.0
 
 
-def jobs_since(begun: float) -> dict[str, list[tuple[float, float]]]:
-    """Return for each stage the job and simulation seconds of the jobs that ended after `begun`."""
+def asked_for(words: list[str]) -> list[str]:
+    """Return the studies that Snakemake is asked for: by name, as `study` with --config, by files, or by default."""
+    given = [found[1] for word in words if (found := re.fullmatch(r"(?:--config=)?study=(.*)", word))]
+    there, asked = {path.stem for path in ROOT.glob("config/*.yaml")}, []
+    for word in words:
+        if word == "study":
+            asked.append((given or ["paper"])[-1])
+        elif word in there:
+            asked.append(word)
+        elif word.startswith("results/"):
+            asked.append(word.split("/")[1])
+    return sorted(there.intersection(asked or ["paper"]))
+
+
+def written_since(begun: float, studies: list[str], pattern: str) -> list[Path]:
+    """Return the files of some studies that match a pattern and were written after `begun`."""
+    found = (path for name in studies for path in sorted((ROOT / "results" / name).glob(pattern)))
+    return [path for path in found if path.stat().st_mtime >= begun]
+
+
+def jobs_since(begun: float, studies: list[str]) -> dict[str, list[tuple[float, float]]]:
+    """Return for each stage the job and simulation seconds of the jobs of some studies that ended after `begun`."""
     jobs: dict[str, list[tuple[float, float]]] = {}
-    for benchmark in sorted(ROOT.glob("results/*/benchmarks/**/*.tsv")):
-        if benchmark.stat().st_mtime < begun:
-            continue
+    for benchmark in written_since(begun, studies, "benchmarks/**/*.tsv"):
         relative = benchmark.relative_to(ROOT / "results")
         log = ROOT / "results" / relative.parts[0] / "logs" / Path(*relative.parts[2:]).with_suffix(".log")
         stage = relative.with_suffix("").parts[2]
@@ -64,9 +84,9 @@ def table(jobs: dict[str, list[tuple[float, float]]], elapsed: float, cores: int
     return "\n".join(lines)
 
 
-def set_aside_since(begun: float) -> dict[str, str]:
+def set_aside_since(begun: float, studies: list[str]) -> dict[str, str]:
     """Return the results that jobs since `begun` refused and set aside, with the reason of each, as their logs say."""
-    logs = [log for log in sorted(ROOT.glob("results/*/logs/**/*.log")) if log.stat().st_mtime >= begun]
+    logs = written_since(begun, studies, "logs/**/*.log")
     found = (re.findall(r"^set aside: (\S+): (.*)$", log.read_text(encoding="utf-8"), re.MULTILINE) for log in logs)
     return {path: reason for pairs in found for path, reason in pairs}
 
@@ -76,14 +96,14 @@ def tied() -> None:
     end_with_parent("run.py")
 
 
-def rounds(command: list[str], environment: dict[str, str]) -> int:
+def rounds(command: list[str], environment: dict[str, str], studies: list[str]) -> int:
     """Run Snakemake, and again while jobs set damaged results aside, so that these are made; return its exit status."""
     made_again: dict[str, str] = {}
     for _ in range(ROUNDS):
         begun = time.time()
         done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=tied)
         status = done.returncode
-        damaged = set_aside_since(begun)
+        damaged = set_aside_since(begun, studies)
         if status == 0 or not damaged:
             break
         made_again |= damaged
@@ -99,34 +119,37 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cores", type=int, required=True)
     options, rest = parser.parse_known_args()
-    begun = time.time()
+    begun, studies = time.time(), asked_for(rest)
     # By its name, as links to it (profiles/) are not in an archive.
     named = any(part.startswith("--workflow-profile") for part in rest)
     profile = [] if named else ["--workflow-profile", "workflow/profiles/default"]
     command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), *profile, *rest]
     try:
         changes, told = room.prepare(ROOT, options.cores)
-    except room.RoomError as error:
+        for name in studies:
+            lock.hold(ROOT, name)
+    except (room.RoomError, lock.RunningError) as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         return 2
     for line in told:
         print(f"stiffdice: {line}", file=sys.stderr)
     try:
-        status = rounds(command, os.environ | changes)
+        status = rounds(command, os.environ | changes, studies)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
     if status and (reason := room.lack_of(ROOT)):
         print(f"stiffdice: {reason}", file=sys.stderr)
-    jobs = jobs_since(begun)
+    jobs = jobs_since(begun, studies)
     if status:
-        import ending  # takes half a second, as it reads studies
-
-        print(ending.told(ROOT, begun), flush=True)
-    elif jobs:
+        print(ending.told(ROOT, begun, studies), flush=True)
+        return status
+    if jobs:
         print("\nwhere the time went")
         print(table(jobs, time.time() - begun, options.cores))
-    return status
+    for line in filter(None, (ending.open_first(ROOT, name) for name in studies)):
+        print(line)
+    return 0
 
 
 if __name__ == "__main__":

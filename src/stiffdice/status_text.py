@@ -109,7 +109,7 @@ def _left(status: Status) -> str:
     if not left.seconds:
         return f"unknown so far{idle}"
     more = f" and {_many(left.unknown, 'job')} of unknown length" if left.unknown else ""
-    return f"about {_duration(left.seconds)}{more} on {_many(left.cores, 'core')}{idle}"
+    return f"about {duration(left.seconds)}{more} on {_many(left.cores, 'core')}{idle}"
 
 
 def _many(count: int, what: str) -> str:
@@ -142,7 +142,7 @@ def _listed(status: Status, state: State) -> list[str]:
 def _since(standing: Standing, now: datetime) -> str:
     parts = []
     if standing.begun is not None:
-        parts.append(f"for {_duration((now - standing.begun).total_seconds())}")
+        parts.append(f"for {duration((now - standing.begun).total_seconds())}")
     if standing.progress:
         parts.append(f"{standing.progress:.0%} done")
     return ", ".join([*parts, *([standing.reason] if standing.reason else [])])
@@ -188,7 +188,8 @@ def _bytes(size: int) -> str:
     return f"{size} bytes"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Return a duration in seconds, minutes or hours, to the precision that an estimate has."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

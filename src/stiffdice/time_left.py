@@ -39,13 +39,14 @@ class Left(NamedTuple):
     cores: int
 
 
-def of(jobs: Sequence[Job], cores: int) -> Left:
+def of(jobs: Sequence[Job], cores: int, pace: float | None = None) -> Left:
     """Return about how long the jobs that are due take; `cores` of them at a time, those that are `alone` one by one.
 
-    A job takes as long as it took before; one that never ended, as its progress says, or as the median of its kind.
+    A job takes as long as it took before; one that never ended, as its progress says, or as the median of its kind. Of
+    a kind of which none ended, nothing is known, unless weights are of one scale for all kinds: `pace` [s] for each.
     """
     rates = _rates(jobs)
-    remaining = [(job, _remaining(job, rates)) for job in jobs if job.due]
+    remaining = [(job, _remaining(job, rates.get(job.kind, pace))) for job in jobs if job.due]
     shared = [seconds for job, seconds in remaining if seconds is not None and not job.alone]
     alone = [seconds for job, seconds in remaining if seconds is not None and job.alone]
     seconds = max(sum(shared) / cores, max(shared, default=0.0)) + sum(alone)
@@ -62,11 +63,14 @@ def _rates(jobs: Iterable[Job]) -> dict[str, float]:
     return {kind: median(rates) for kind, rates in found.items()}
 
 
-def _remaining(job: Job, rates: dict[str, float]) -> float | None:
-    """Return the seconds until a job is done, None if unknown: nothing like it has ended, or it takes longer."""
+def _remaining(job: Job, rate: float | None) -> float | None:
+    """Return the seconds until a job is done, None if unknown: nothing like it has ended, or it takes longer.
+
+    rate [s]: for each of its weight, None if unknown.
+    """
     whole = job.took if job.projected is None else job.projected
-    if whole is None and job.kind in rates:
-        whole = rates[job.kind] * job.weight
+    if whole is None and rate is not None:
+        whole = rate * job.weight
     if whole is None or job.elapsed is None:
         return whole
     return whole - job.elapsed if whole > job.elapsed else None

@@ -199,6 +199,7 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
     done = finished.snakemake()
     assert done.returncode == 0
     assert "Nothing to be done" in done.stdout + done.stderr
+    assert "about" not in done.stderr
     assert before == {path: path.stat().st_mtime_ns for path in (finished.folder / "results").rglob("*")}
 
 
@@ -413,3 +414,6 @@ def test_where_the_time_went_is_told(finished):
     assert done.returncode == 0, done.stderr
     assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
     assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
+    # Before it, how long it will take, of the four jobs that are due; and at last what to open.
+    assert len(re.findall(r"^stiffdice: tiny: 4 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
+    assert done.stdout.splitlines()[-1] == "open first: results/tiny/figures/books.svg (Books)"

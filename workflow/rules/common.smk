@@ -196,7 +196,35 @@ def tell_of_cluster():
     if on_cluster():
         import ending
 
-        print(ending.told(Path(workflow.basedir), BEGUN), file=sys.stderr)
+        print(ending.told(Path(workflow.basedir), BEGUN, {*jobs_due().values()}), file=sys.stderr)
+
+
+@cache
+def jobs_due():
+    """Return the studies of which something is to be made when first asked, by the benchmark files of their jobs."""
+    return {str(job.benchmark): job.wildcards.study for job in workflow.dag.needrun_jobs() if job.benchmark}
+
+
+def one_at_a_time():
+    """Lock the studies of which something is to be made; is one being made, that ends Snakemake with exit status 2."""
+    import lock
+
+    try:
+        for name in sorted({*jobs_due().values()}):
+            lock.hold(Path(workflow.basedir), name)
+    except lock.RunningError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def tell_how_long():
+    """Say about how long it takes, and then what is left; of a cluster, whose jobs queue, and of no job, nothing."""
+    if on_cluster() or workflow.touch or not jobs_due():
+        return
+    import duration
+
+    due = {name: study(name) for name in sorted({*jobs_due().values()})}
+    duration.Duration(due, jobs_due().keys(), workflow.cores).tell()
 
 
 @cache

@@ -1,0 +1,56 @@
+"""What is named as the first to open, once a study is made."""
+
+from __future__ import annotations
+
+import pytest
+from tests.workflow.test_workflow import ROOT
+
+
+@pytest.fixture
+def ending(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "workflow")
+    import ending
+
+    return ending
+
+
+@pytest.fixture
+def project(tmp_path):
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    return tmp_path
+
+
+def made(project, *names):
+    for name in names:
+        path = project / "results" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+@pytest.mark.parametrize(
+    ("study", "figure"),
+    [
+        ("paper", "figure-13.svg (Figure 13: steps needed against stiffness)"),
+        ("quick", "frontier.svg (Steps needed against stiffness)"),
+        ("stability", "map-sliding.svg (Where a sliding cube passes)"),
+        ("extremes", "atlas.svg (Where and how runs fail"),
+        ("tradeoff", "evaluations-position.svg (Error of the position against force evaluations)"),
+        ("elastic", "elastic.svg (A cube that slides: the dense grid's answer"),
+        ("peers", "limits.svg (One flat bounce with longer and longer steps"),
+    ],
+)
+def test_the_first_figure_that_shows_more_than_single_runs(ending, project, study, figure):
+    made(project, f"{study}/figures/figure-01.svg", f"{study}/figures/{figure.partition(' ')[0]}")
+    assert ending.open_first(project, study).startswith(f"open first: results/{study}/figures/{figure}")
+
+
+def test_only_what_is_there_is_named(ending, project):
+    assert ending.open_first(project, "paper") == ""
+    made(project, "paper/figures/throw.gif")
+    title = "The throw of figures 1 to 3, as listed"
+    assert ending.open_first(project, "paper") == f"open first: results/paper/figures/throw.gif ({title})"
+
+
+def test_a_table_where_no_figure_is(ending, project):
+    made(project, "stability/tables/answers.md")
+    assert ending.open_first(project, "stability").startswith("open first: results/stability/tables/answers.md (")

@@ -1,0 +1,89 @@
+"""How long a run of the workflow takes: about, at its start; and now and then what is left, until it ends."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Collection, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+
+from stiffdice import forecast, job_log, time_left
+from stiffdice.results import Result
+from stiffdice.status_text import duration
+from stiffdice.study import Study
+from stiffdice.time_left import Job
+
+MEASURING = ("experiment", "timings")  # of which nothing tells better how long they take than how long they took
+OFTEN, SELDOM, LINES = (
+    20.0,
+    300.0,
+    8,
+)  # s between two lines, at least and at most; of what is left, at first, so many parts
+CROWDED = 1.2  # times as long as alone that is worth a word
+
+
+class Duration:
+    """About how long some jobs take, of studies by name; due: their benchmark files, under the project's folder."""
+
+    def __init__(self, studies: Mapping[str, Study], due: Collection[str], cores: int) -> None:
+        self._cores, self._begun = cores, time.time()
+        self._crowding = forecast.crowding(cores)
+        slowness = forecast.slowness()
+        self._expected: dict[tuple[Path, Result], float] = {}
+        for name, study in studies.items():
+            folder = Path("results", name)
+            for result, seconds in forecast.seconds(study).items():
+                if (folder / result.benchmark).as_posix() in due:
+                    before = time_left.took(folder / result.benchmark) if result.stage in MEASURING else None
+                    self._expected[folder, result] = before or seconds * slowness
+        self._name = ", ".join(studies)
+
+    def told(self) -> str:
+        """Return a line on the whole of it, as it looks before it begins."""
+        alone, here = (time_left.of(self._jobs(), self._cores, pace) for pace in (1.0, self._crowding))
+        crowd = f"; beside what else runs here now, {duration(here.seconds)}" if self._crowding > CROWDED else ""
+        jobs, cores = len(self._expected), f"{self._cores} core{'s' if self._cores > 1 else ''}"
+        return f"{self._name}: {jobs} job{'s' if jobs > 1 else ''}, about {duration(alone.seconds)} on {cores}{crowd}"
+
+    def left(self) -> tuple[str, float]:
+        """Return a line on what is left, and how long that is [s].
+
+        It goes by how long the jobs that have ended took, next to what was expected of them.
+        """
+        jobs = self._jobs()
+        ended = [(job.took, job.weight) for job in jobs if job.took is not None]
+        pace = sum(took for took, _ in ended) / sum(weight for _, weight in ended) if ended else self._crowding
+        left = time_left.of(jobs, self._cores, pace)
+        late = left.unknown and not left.seconds
+        rest = "what is left takes longer than foreseen" if late else f"about {duration(left.seconds)} left"
+        return f"{self._name}: {len(ended)} of {len(jobs)} jobs done, {rest}", left.seconds
+
+    def tell(self) -> None:
+        """Say at once how long it takes, and from now on what is left, as long as this process lives."""
+        print(f"stiffdice: {self.told()}", file=sys.stderr, flush=True)
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        _, seconds = self.left()
+        while True:
+            time.sleep(min(max(OFTEN, seconds / LINES), SELDOM))
+            line, seconds = self.left()
+            print(f"stiffdice: {line}", file=sys.stderr, flush=True)
+
+    def _jobs(self) -> list[Job]:
+        return [self._job(folder, result, weight) for (folder, result), weight in self._expected.items()]
+
+    def _job(self, folder: Path, result: Result, weight: float) -> Job:
+        """Return what is known of a job so far: nothing of an earlier run's."""
+        kind = f"shard {result.name.partition('/')[0]}" if result.stage == "shard" else result.stage
+        job = Job(kind, weight, None, due=True, alone=result.stage == "timings")
+        told = job_log.read(folder / result.log)
+        if told is None or told.begun is None or told.begun.timestamp() < self._begun - 1:  # told in whole seconds
+            return job
+        if told.ending:
+            took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
+            return job._replace(took=took, due=False)
+        elapsed, heard = ((when - told.begun).total_seconds() for when in (datetime.now(UTC), told.written))
+        return job._replace(elapsed=elapsed, progress=told.progress, told=heard)
