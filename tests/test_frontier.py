@@ -70,7 +70,7 @@ def test_missing_points_are_left_out_and_two_are_no_law():
 
 @pytest.mark.parametrize("factor", [1e-3, 1.0, 50.0])
 def test_the_band_is_the_textbooks(factor):
-    """Against numpy polyfit's covariance, propagated to the line."""
+    """Against numpy polyfit's covariance, propagated to the line, and the scatter of a further point about it."""
     rng = np.random.default_rng(1)
     stiffness = np.geomspace(1e2, 1e7, 11)
     steps = factor * stiffness**0.5 * 10 ** rng.normal(0, 0.1, 11)
@@ -78,7 +78,8 @@ def test_the_band_is_the_textbooks(factor):
     (slope, base), covariance = np.polyfit(np.log10(stiffness), np.log10(steps), 1, cov=True)
     at = np.geomspace(1, 1e9, 7)
     x = np.log10(at)
-    error = np.sqrt(covariance[0, 0] * x**2 + 2 * covariance[0, 1] * x + covariance[1, 1])
+    of_line = covariance[0, 0] * x**2 + 2 * covariance[0, 1] * x + covariance[1, 1]
+    error = np.sqrt(of_line + fit["scatter"] ** 2)
     low, high = frontier.band(fit, at)
     np.testing.assert_allclose(np.log10(low), slope * x + base - 2 * error, atol=1e-9)
     np.testing.assert_allclose(np.log10(high), slope * x + base + 2 * error, atol=1e-9)

@@ -83,12 +83,13 @@ def power_law(stiffness: Values, steps: Values) -> dict[str, float]:
 
 
 def band(fit: Mapping[str, float], stiffness: Values) -> tuple[Values, Values]:
-    """Return the steps between which a power law lies by two standard errors, shape of `stiffness` each.
+    """Return the steps between which a further edge would lie by two standard errors, shape of `stiffness` each.
 
-    The textbook's confidence band of a regression line: scatter·√(1/n + (x − x̄)²/Σ(x − x̄)²) in the logarithm.
+    The textbook's prediction band of a regression line: scatter·√(1 + 1/n + (x − x̄)²/Σ(x − x̄)²) in the logarithm. The
+    band of the line itself is narrower, and leaves points out wherever the edges are no exact power law.
     """
     away = np.log10(stiffness / fit["centre"])
-    width = 2 * np.sqrt(fit["scatter"] ** 2 / fit["points"] + (fit["exponent_error"] * away) ** 2)
+    width = 2 * np.sqrt(fit["scatter"] ** 2 * (1 + 1 / fit["points"]) + (fit["exponent_error"] * away) ** 2)
     middle = np.log10(fit["factor"]) + fit["exponent"] * np.log10(stiffness)
     return 10 ** (middle - width), 10 ** (middle + width)
 

@@ -28,15 +28,20 @@ def position(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
 
 
 def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the paper's energy and the full one, with the springs', against time, a panel for each preset."""
+    """Return the paper's energy and the mechanical one against time, a panel for each preset.
+
+    The mechanical one takes the velocity at the time of the place; files of before format 1.3 lack it, and get the sum
+    of the stored energies.
+    """
     figure = style.new_figure(title, height=1.3 + 1.75 * len(runs))
     panels = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for panel, (preset, run) in zip(panels, runs.items(), strict=True):
         look = style.PRESET_LOOKS[preset]
-        start = float(run.energy_paper[0] + run.elastic_energy[0])
-        panel.axhline(start, color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
-        full = run.energy_paper + run.elastic_energy
-        panel.plot(run.time, full, color=style.INK, linewidth=2.4, label="with the springs' energy")
+        full = run.get("mechanical_energy", run.energy_paper + run.elastic_energy)
+        panel.axhline(float(full[0]), color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
+        panel.plot(
+            run.time, full, color=style.INK, linewidth=2.4, label="with the springs', speed and place at one time"
+        )
         panel.plot(run.time, run.energy_paper, color=look["color"], label="paper's: kinetic + m g z", zorder=3)
         panel.set_title(look["label"])
         panel.set_ylabel("energy [J]")
