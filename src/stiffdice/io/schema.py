@@ -100,6 +100,7 @@ KINDS: dict[str, Kind] = {
             "criteria": Attribute(TEXT),
             "tolerance": Attribute(NUMBER, RECOMMENDED),
             "verdict_text": Attribute(TEXT, RECOMMENDED),
+            "scene_derived": Attribute(TEXT, OPTIONAL),
         },
         {
             "time": Variable(_TIME, "f8", "s"),
