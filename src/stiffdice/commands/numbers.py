@@ -52,4 +52,5 @@ def steps_of(text: str, duration: float) -> tuple[int, str]:
     if round(ratio) > 0 and abs(ratio - round(ratio)) <= _WHOLE * ratio:
         return round(ratio), ""
     steps = math.ceil(ratio)
-    return steps, f"{steps} steps of {duration / steps:.9g} s: {asked:g} s does not divide the duration, {duration:g} s"
+    count = f"{steps} step{'s' if steps > 1 else ''}"
+    return steps, f"{count} of {duration / steps:.9g} s: {asked:g} s does not divide the duration, {duration:g} s"
