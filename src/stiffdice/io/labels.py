@@ -11,19 +11,12 @@ _FLAGS = ("flag_values", "flag_meanings")
 
 
 def labelled(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with every enum as text; what has one dimension and is a coordinate can be selected by word.
+    """Return a dataset with every enum as words, to select by.
 
-    So `sel(axis="z")` of a run, `sel(contact="gated")` of a frontier, and of the cells of a sweep.
+    So `sel(axis="z")` of a run, `sel(contact="gated")` of a frontier, and of a sweep, for all cells of that law.
     """
     words = {str(name): _words(part) for name, part in dataset.variables.items() if _FLAGS[1] in part.attrs}
-    found = dataset.drop_indexes([name for name in words if name in dataset.indexes]).assign_coords(
-        {name: variable for name, variable in words.items() if name in dataset.coords}
-    )
-    found = found.assign({name: variable for name, variable in words.items() if name not in dataset.coords})
-    for name in words:
-        if name in found.coords and found[name].ndim == 1 and name not in found.xindexes:
-            found = found.set_xindex(name)
-    return found
+    return dataset.assign(words)
 
 
 def _words(variable: xr.Variable) -> xr.Variable:
