@@ -63,8 +63,9 @@ def test_restitution_is_that_of_the_scenes_contact_law():
     assert heavy == pytest.approx(2 * gated, rel=1e-15)
 
 
-def test_a_preset_chooses_the_law_of_a_restitution():
+def test_a_preset_chooses_the_law_of_a_restitution_and_otherwise_it_acts_in_contact_only():
     asked = {"ground": {"restitution": 0.5}}
+    assert from_mapping(asked).ground == from_mapping(asked, "as_written").ground
     written = from_mapping(asked, "as_written").ground
     assert written == from_mapping({"ground": {"restitution": 0.5, "contact": "gated"}}).ground
     assert written.damping != from_mapping(asked, "as_listed").ground.damping

@@ -324,7 +324,7 @@ def test_a_sweep_of_the_ground_that_a_restitution_is_for_has_it(changed):
     change = {
         f"{SWEEP}.set": ["ground.restitution=0.5", "cube.side=1 m"],
         f"{SWEEP}.stiffness": 1e4,
-        f"{SWEEP}.contact": ["ungated"],
+        f"{SWEEP}.contact": ["gated"],
     }
     planned = changed(change).sweeps["steps-needed"]
     (column,) = planned.columns()

@@ -157,9 +157,11 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
     """
     top = checks.known_keys("", _given(mapping), _TOP_KEYS)
     sections = {name: dict(checks.known_keys(name, _given(top.get(name)), _KEYS[name])) for name in _SECTIONS}
-    if "side" in sections["cube"]:
-        sections["cube"].setdefault("geometry", stated.TRUE)
     chosen = preset if preset is not None else top.get("preset")
+    if "side" in sections["cube"]:
+        sections["cube"].setdefault("geometry", stated.GEOMETRY)
+    if "restitution" in sections["ground"] and chosen is None:
+        sections["ground"].setdefault("contact", stated.CONTACT)
     if chosen is not None:
         _apply_preset(checks.choice("preset", chosen, PRESETS), sections)
     keys, derived = stated.cube(sections["cube"])

@@ -17,8 +17,10 @@ INSTEAD: Mapping[str, Mapping[str, str]] = {
     "ground": {"restitution": "damping", "contact_time": "stiffness"},
 }
 
-# The geometry of a cube whose side is given.
-TRUE = "exact"
+# What goes with a side, unless a geometry is given beside it; and with a restitution, unless a contact law or a preset
+# is: the law of the listings would brake a cube of such a damping in the air.
+GEOMETRY = "exact"
+CONTACT = "gated"
 
 # Keys as stored with their values, and what was derived, a line for each value.
 Resolved = tuple[dict[str, Any], tuple[str, ...]]
@@ -37,14 +39,11 @@ def _refuse_both(section: str, keys: Mapping[str, Any]) -> None:
 
 
 def cube(keys: Mapping[str, Any]) -> Resolved:
-    """Return the keys of a cube with its radius for its side; raises InputError if it has both.
-
-    A side is that of a true cube unless a geometry is given beside it: presets give place to it.
-    """
+    """Return the keys of a cube with its radius for its side; raises InputError if it has both."""
     _refuse_both("cube", keys)
     if "side" not in keys:
         return dict(keys), ()
-    geometry = checks.choice("cube.geometry", keys.get("geometry", TRUE), GEOMETRIES)
+    geometry = checks.choice("cube.geometry", keys.get("geometry", GEOMETRY), GEOMETRIES)
     side = checks.number("cube.side", keys["side"], "m", above=0)
     radius = radius_of(side, geometry)
     rest = {key: value for key, value in keys.items() if key != "side"}
@@ -66,7 +65,7 @@ def ground(keys: Mapping[str, Any], cube: Cube) -> Resolved:
     restitution = checks.number("ground.restitution", keys["restitution"], "1")
     if not 0 < restitution <= 1:
         raise InputError(f"ground.restitution = {restitution:g}: allowed is a number above 0, up to 1 [1]")
-    law = checks.choice("ground.contact", keys.get("contact", Ground.contact), CONTACT_LAWS)
+    law = checks.choice("ground.contact", keys.get("contact", CONTACT), CONTACT_LAWS)
     rest = {key: value for key, value in keys.items() if key not in INSTEAD["ground"]}
     source = f"from ground.restitution = {restitution:g}"
     told: tuple[str, ...] = ()

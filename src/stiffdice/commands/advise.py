@@ -16,7 +16,7 @@ EXAMPLES = """\
 examples:
   stiffdice advise config/scenes/figure-04.yaml --error 1%
   stiffdice advise --stiffness 1e6 --mass '20 g' --contact gated --error 1e-6
-  stiffdice advise --side '16 mm' --mass '5 g' --restitution 0.5 --contact-time '0.2 ms' --duration 1 --error '0.1 mm'
+  stiffdice advise --side '16 mm' --mass '5 g' --restitution 0.5 --position '0,0,30 cm' --velocity 1,0,0 --error 0.1%
   stiffdice advise config/scenes/figure-09.yaml --error 1% --horizon 2 --run -o advised.h5
   stiffdice advise config/scenes/figure-09.yaml --scheme symplectic_euler --json
 
