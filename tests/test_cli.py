@@ -114,8 +114,31 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", SCENE, "-o", "out.h5", "--preset", "wrong"], "preset = wrong: allowed is as_listed or"),
         (["run", SCENE, "-o", "out.h5", "--set", "ground.stifness=1"], "did you mean stiffness?"),
         (["run", SCENE, "-o", "out.h5", "--set", "cube.mass=-1"], "cube.mass = -1: allowed is a finite number > 0"),
-        (["run", SCENE, "-o", "out.h5", "--quickly"], "unrecognized arguments: --quickly"),
+        (["run", SCENE, "-o", "out.h5", "--quickly"], "run: unrecognized arguments: --quickly (see stiffdice run"),
+        (["run", SCENE, "-o", "out.h5", "--stpes", "5"], "unrecognized arguments: --stpes; did you mean --steps?"),
+        (["run", SCENE, "--outptu=out.h5"], "unrecognized arguments: --outptu=out.h5; did you mean --output?"),
+        (["--verzion"], "stiffdice: unrecognized arguments: --verzion; did you mean --version?"),
         (["fly"], "invalid choice: 'fly'"),
+        (["rnu", SCENE], "did you mean run?"),
+        (
+            ["run", SCENE, "--set", "ground.stiffness", "1e6", "-o", "out.h5"],
+            "argument --set: ground.stiffness: write --set ground.stiffness=VALUE, no blank about the =",
+        ),
+        (["run", SCENE, "--set", "ground.stiffness=", "1e6", "-o", "out.h5"], "write --set ground.stiffness=VALUE"),
+        (["run", SCENE, "--set", "cube.mass=0,5", "-o", "out.h5"], "cube.mass = 0,5: a decimal comma is not read; "),
+        (["run", SCENE, "--steps", "10,000", "-o", "out.h5"], "--steps = 10,000: allowed is a whole number from 1"),
+        (["run", SCENE, "--dt", "0,1", "-o", "out.h5"], "--dt = 0,1: a decimal comma is not read; write 0.1; allowed"),
+        (["run", SCENE, "--dt", "5 mm", "-o", "out.h5"], "--dt = 5 mm: mm is no unit of [s]; allowed is a finite"),
+        (["run", SCENE, "--dt", "0", "-o", "out.h5"], "--dt = 0.0: allowed is a finite number > 0 [s]"),
+        (["run", SCENE, "--dt", "1e-99", "-o", "out.h5"], "--dt = 1e-99: asks for 1e+100 steps; allowed are"),
+        (["run", SCENE, "--dt", "1", "--steps", "5", "-o", "out.h5"], "--steps: not allowed with argument --dt"),
+        (["run", SCENE, "-o", "-"], "-o -: nothing is written to standard output"),
+        (["advise", "--run", "-o", "-"], "-o -: nothing is written to standard output"),
+        (["advise", "--damping", "1", "--restitution", "0.5"], "--restitution: not allowed with argument --damping"),
+        (["advise", "--error", "0,1%"], "--error = 0,1%: a decimal comma is not read; write 0.1%"),
+        (["advise", "--horizon", "5 g"], "--horizon = 5 g: g is no unit of [s]"),
+        (["rebuild", "x.zip", "-o", "-"], "-o -: nothing is written to standard output"),
+        (["bench", "--folder", "-"], "--folder -: nothing is written to standard output"),
         ([], "required: COMMAND"),
         (["inspect", "nowhere.h5"], "nowhere.h5: No such file"),
         (["inspect", SCENE], "not a readable HDF5 file"),
@@ -164,6 +187,71 @@ def test_auto_says_which_model_and_why_and_stores_it(stiffdice):
     told = stiffdice("inspect", "out.h5")[1]
     assert "  model: vertical\n" in told
     assert f"  model_reason: {reason}\n" in told
+
+
+def test_a_users_own_file_is_replaced_only_if_asked(stiffdice, tmp_path):
+    run = ["run", SCENE, "--model", "sliding", "--steps", "100", "-o"]
+    for name, content in (("notes.txt", "mine"), ("theirs.h5", "\x89HDF"), ("quick.zip", "PK")):
+        (tmp_path / name).write_text(content)
+        commands = (run, ["advise", SCENE, "--run", "-o"]) if name != "quick.zip" else (run,)
+        for command in commands:
+            status, out, err, _ = stiffdice(*command, name)
+            assert (status, out) == (2, "")
+            assert err.startswith(
+                f"stiffdice: {name}: is there already, and no such file of stiffdice; name another, or"
+            )
+            assert (tmp_path / name).read_text() == content
+    assert stiffdice(*run, "notes.txt", "--force")[0] == 0
+    assert stiffdice(*run, "notes.txt")[0] == 0, "a file of stiffdice is replaced"
+    (tmp_path / "empty").touch()
+    assert stiffdice(*run, "empty")[0] == 0, "there is nothing to lose"
+    assert "is the scene itself" in stiffdice(*run, SCENE, "--force")[2]
+
+
+@pytest.mark.parametrize(
+    ("dt", "steps", "told"),
+    [
+        ("1e-3", 10_000, []),
+        ("1 ms", 10_000, []),
+        ("0.7", 15, ["15 steps of 0.666666667 s: 0.7 s does not divide the duration, 10 s"]),
+        ("3 ms", 3334, ["3334 steps of 0.00299940012 s: 0.003 s does not divide the duration, 10 s"]),
+        ("99", 1, ["1 step of 10 s: 99 s does not divide the duration, 10 s"]),
+    ],
+)
+def test_a_step_size_stands_for_the_fewest_steps_no_longer(stiffdice, dt, steps, told):
+    status, out, _, _ = stiffdice("run", SCENE, "--model", "sliding", "--dt", dt, "-o", "out.h5")
+    assert status == 0
+    assert out.splitlines()[:-1] == told
+    with xr.open_dataset("out.h5") as found:
+        assert found.attrs["steps"] == steps
+
+
+def test_what_was_derived_is_told_and_stored(stiffdice):
+    changes = ["cube.side=16 mm", "cube.mass=5 g", "ground.restitution=0.5", "ground.contact_time=0.2 ms"]
+    given = [word for change in changes for word in ("--set", change)]
+    status, out, err, _ = stiffdice("run", SCENE, *given, "--model", "sliding", "--dt", "10 ms", "-o", "out.h5")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()[:3]
+    assert [line.partition(" = ")[0] for line in lines] == ["cube.radius", "ground.stiffness", "ground.damping"]
+    with xr.open_dataset("out.h5") as found:
+        assert found.attrs["scene_derived"] == "; ".join(lines)
+        assert json.loads(found.attrs["scene"])["cube"]["radius"] == pytest.approx(0.008 * 3**0.5, rel=1e-15)
+    assert "scene_derived: cube.radius = 0.0138564 m" in stiffdice("inspect", "out.h5")[1]
+
+
+def test_advise_takes_a_restitution_units_and_an_error_as_a_length(stiffdice):
+    words = ["--preset", "as_written", "--side", "16 mm", "--mass", "5 g", "--contact-time", "1 ms"]
+    words += ["--position", "0,0,20 mm", "--velocity", "0,0,0", "--duration", "50 ms", "--error", "0.1 mm"]
+    status, out, _, _ = stiffdice("advise", *words, "--restitution", "0.5")
+    assert status == 0
+    assert out.startswith("cube.radius = 0.0138564 m, from cube.side = 0.016 m by the exact geometry\nground.stiffness")
+    assert "ground.damping = " in out
+    assert "0.00722 asked" in out  # 0.1 mm of 8√3 mm
+
+
+def test_the_command_that_advice_gives_is_quoted_for_the_shell(stiffdice):
+    out = stiffdice("advise", SCENE, "--stiffness", "10 kN/m", "--horizon", "1")[1]
+    assert "--set 'ground.stiffness=10 kN/m'" in out
 
 
 def test_inspect_json_is_for_programs(stiffdice):

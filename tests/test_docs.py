@@ -12,6 +12,7 @@ import matplotlib as mpl
 import pytest
 import yaml
 
+from stiffdice import stated
 from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.cli import main
 from stiffdice.criteria import CRITERIA
@@ -81,13 +82,19 @@ def test_the_table_of_scene_keys_has_every_key_and_its_default():
     expected = {key: plain[key] for key in ("gravity", "duration")}
     for section in ("cube", "ground", "launch"):
         expected |= {f"{section}.{key}": value for key, value in plain[section].items()}
-    told = {}
+    told, in_other_words = {}, set()
     for row in table_keys("config/README.md", "Scene"):
         key = re.match(r"`([\w.]+)`", row[0])[1]
         if key in PRESETS or key == "preset":
             continue
+        section, _, name = key.partition(".")
+        if name in stated.INSTEAD.get(section, ()):
+            assert row[2] == "", "what is given in other words has no default"
+            in_other_words.add(key)
+            continue
         told[key] = yaml.safe_load(row[2].strip("`").replace("e4", "e+4"))
     assert told == expected
+    assert in_other_words == {f"{section}.{name}" for section, names in stated.INSTEAD.items() for name in names}
 
 
 def test_the_table_of_study_keys_has_every_key():

@@ -80,9 +80,9 @@ def test_there_is_a_scene_for_each_figure_and_shared_ones_agree():
     ("text", "told"),
     [
         ("ground: {stifness: 1}", "ground.stifness: unknown key; allowed are stiffness, damping, friction, contact, "
-                                  "normal; did you mean stiffness?"),
+                                  "normal, restitution, contact_time; did you mean stiffness?"),
         ("wind: 3", "wind: unknown key; allowed are preset, cube, ground, launch, gravity, duration"),
-        ("cube: 3", "cube = 3: allowed are keys: radius, mass, geometry, inertia"),
+        ("cube: 3", "cube = 3: allowed are keys: radius, mass, geometry, inertia, side"),
         ("[1, 2]", "the file = [1, 2]: allowed are keys"),
         ("duration: 0", "duration = 0: allowed is a finite number > 0 [s]"),
         ("duration: .inf", "duration = inf: allowed is a finite number > 0 [s]"),
@@ -105,6 +105,9 @@ def test_there_is_a_scene_for_each_figure_and_shared_ones_agree():
         ("ground: {stiffness: 1", "line 1: not valid YAML"),
         ("gravity: !!python/object/apply:os.getcwd []", "not valid YAML"),
         ("? [1]\n: 2", "a key must be a word"),
+        ("cube: {mass: 0,5}", "a key must be a word; a decimal comma is written as a point"),
+        ("gravity: 9,81", "gravity = 9,81: a decimal comma is not read; write 9.81"),
+        ("cube: {mass: 5 mm}", "cube.mass = 5 mm: mm is no unit of [kg]"),
     ],
 )  # fmt: skip
 def test_bad_scenes_end_with_one_line_that_names_the_file(tmp_path, text, told):

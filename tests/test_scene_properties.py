@@ -187,7 +187,10 @@ plain = st.recursive(
     max_leaves=8,
 )
 names = st.sampled_from(
-    ["preset", "cube", "ground", "launch", "gravity", "duration", "mass", "radius", "seed", "normal", "x"]
+    [
+        *("preset", "cube", "ground", "launch", "gravity", "duration", "mass", "radius", "seed", "normal", "x"),
+        *("side", "restitution", "contact_time", "angular_momentum"),
+    ]
 )
 
 

@@ -397,7 +397,8 @@ def test_ctrl_c_ends_watching_as_it_stands(project, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["nowhere"], "config/nowhere.yaml: No such file"),
+        (["nowhere"], "config/nowhere.yaml: there is no study nowhere; those in config/ are "),
+        (["qick"], "; did you mean quick?"),
         (["../quick"], "STUDY = ../quick: allowed is the name of a file in config/, without .yaml"),
         (["quick", "--cores", "0"], "--cores = 0: allowed is a whole number from 1"),
     ],

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import itertools
 from pathlib import Path
@@ -10,7 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiffdice import catalogue, shards, study, theory
+from stiffdice import catalogue, exact, shards, study, theory
 from stiffdice.criteria import CRITERIA
 from stiffdice.errors import InputError
 from stiffdice.grid import Column
@@ -245,6 +246,16 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         (f"{SWEEP}.stiffness.from", -1, "allowed is a finite number > 0"),
         (f"{SWEEP}.stiffness.from", float("nan"), f"{SWEEP}.stiffness.from = nan: allowed is a finite number"),
         (f"{SWEEP}.stiffness.to", float("inf"), "allowed is a finite number > 0"),
+        (f"{SWEEP}.stiffness.to", 1, f"{SWEEP}: stiffness.from = 100: allowed is a number <= to = 1 [kg/s²]"),
+        (
+            f"{SWEEP}.stiffness",
+            [{"from": 1, "to": 2, "count": 2}, {"from": 5, "to": 4, "count": 2}],
+            f"{SWEEP}: stiffness.from = 5: allowed is a number <= to = 4 [kg/s²]",
+        ),
+        (f"{SWEEP}.model", "slidng", "or auto; did you mean sliding?"),
+        (f"{SWEEP}.set", ["ground.restitution=0.5"], f"{SWEEP}: scene: its ground.restitution is that of stiffness"),
+        ("figures.frontier.draw", "fronteir", "; did you mean frontier?"),
+        ("figures.frontier.of", ["step-needed"], "allowed is steps-needed; did you mean steps-needed?"),
         (f"{SWEEP}.omega_h.to", float("inf"), f"{SWEEP}.omega_h.to = inf: allowed is a finite number > 0"),
         (f"{SWEEP}.omega_h.count", 0, f"{SWEEP}.omega_h.count = 0: allowed is a whole number from 1"),
         (f"{SWEEP}.contact", ["sticky"], f"{SWEEP}.contact.0 = sticky: allowed is ungated or gated"),
@@ -309,6 +320,26 @@ def test_bad_studies_end_with_one_line(changed, path, value, told):
     assert "\n" not in str(caught.value)
 
 
+def test_a_sweep_of_the_ground_that_a_restitution_is_for_has_it(changed):
+    change = {
+        f"{SWEEP}.set": ["ground.restitution=0.5", "cube.side=1 m"],
+        f"{SWEEP}.stiffness": 1e4,
+        f"{SWEEP}.contact": ["gated"],
+    }
+    planned = changed(change).sweeps["steps-needed"]
+    (column,) = planned.columns()
+    scene = planned.scene_of(column)
+    assert exact.restitution(dataclasses.replace(scene, gravity=0), 1.0) == pytest.approx(0.5, rel=1e-12)
+
+
+def test_a_study_that_is_not_there_is_told_with_those_that_are(tmp_path, study_schema):
+    told = r"config/stabilty.yaml: there is no study stabilty; .* quick, stability.*; did you mean stability\?$"
+    with pytest.raises(InputError, match=told):
+        study.load(CONFIG / "stabilty.yaml", study_schema)
+    with pytest.raises(InputError, match=f"there is no study x; {tmp_path}/ has none$"):
+        study.load(tmp_path / "x.yaml", study_schema)
+
+
 ROCKING = {"measure": "rocking", "scene": SCENE}
 
 
@@ -318,6 +349,7 @@ ROCKING = {"measure": "rocking", "scene": SCENE}
         ({"measure": "beauty"}, f"measure = beauty: allowed is {' or '.join(catalogue.EXPERIMENTS)}"),
         ({"scene": "nowhere.yaml"}, "nowhere.yaml: No such file"),
         ({"set": ["cube.mass=-1"]}, "cube.mass = -1"),
+        ({"set": ["ground.restitution=0.5"]}, "scene: its ground.restitution is that of stiffness 10000 kg/s²"),
         ({"options": {"stepz": 3}}, "options.stepz: unknown key; allowed are"),
         ({"options": {"steps": "many"}}, "options.steps = many: allowed is a whole number"),
         ({"options": {"steps": 0}}, "options.steps = 0: allowed is a whole number from 1"),

@@ -96,30 +96,6 @@ def test_an_edge_and_a_corner_are_stiffest_when_the_cube_is_nearly_flat():
         assert theory.contact_modes(scene, offsets, np.argsort(offsets[:, 2])[:2])[-1] < 5 * unit
 
 
-def schwager_poeschel(zeta):
-    """As published, with ω = 1: β = ζ, ω_d² = 1 − ζ² (doi:10.1007/s10035-007-0065-z)."""
-    rate = np.sqrt(abs(1 - zeta**2))
-    if zeta > 1:
-        return np.exp(-zeta / rate * np.log((zeta + rate) / (zeta - rate)))
-    angle = np.arctan(2 * zeta * rate / (rate**2 - zeta**2))
-    return np.exp(-zeta / rate * (np.pi - angle if zeta < np.sqrt(0.5) else -angle))
-
-
-@pytest.mark.parametrize("zeta", [0.0, 1e-6, 0.1, 0.5, 0.7071, 0.7072, 0.9, 0.999, 1.001, 1.5, 3.0])
-def test_restitution_is_schwager_and_poeschels_on_all_branches(zeta):
-    assert theory.restitution(zeta) == pytest.approx(schwager_poeschel(zeta), rel=1e-12)
-
-
-@pytest.mark.parametrize("zeta", [1 - 2**-53, 1.0, 1 + 2**-52, 1 - 1e-12, 1 + 1e-12])
-def test_restitution_is_smooth_at_critical_damping(zeta):
-    assert theory.restitution(zeta) == pytest.approx(np.exp(-2), rel=1e-11)
-
-
-@pytest.mark.parametrize("zeta", [1e4, 1e100])
-def test_a_heavily_damped_bounce_keeps_a_quarter_of_the_inverse_square(zeta):
-    assert theory.restitution(zeta) == pytest.approx(1 / (4 * zeta * zeta), rel=1e-6)
-
-
 @pytest.mark.parametrize("n", [2, 3, 4, 7, 12, 100])
 def test_at_a_magic_step_half_a_period_is_whole_steps(n):
     """n steps of the oscillator turn any place and speed around, and no fewer do."""

@@ -3,34 +3,49 @@
 from __future__ import annotations
 
 import argparse
+import itertools
+import re
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
-from stiffdice import __version__
+from stiffdice import __version__, checks
 from stiffdice.commands import advise, archive, bench, diff, inspect, rebuild, run, status, verify
 from stiffdice.errors import StiffdiceError
 
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-09.yaml --model sliding -o stiff.h5
-  stiffdice run my-cube.yaml --steps 1e5 --set ground.stiffness=1e6 --set cube.mass=0.02 -o out.h5
-  stiffdice run my-cube.yaml --model auto -o out.h5
-  stiffdice advise my-cube.yaml --error 1%
+  stiffdice run config/scenes/figure-09.yaml --dt '0.1 ms' --set ground.stiffness='500 kN/m' -o softer.h5
+  stiffdice run config/scenes/figure-04.yaml --model auto -o throw.h5
+  stiffdice advise config/scenes/figure-04.yaml --error 1%
   stiffdice inspect stiff.h5
-  stiffdice diff stiff.h5 out.h5
-  stiffdice status paper
-  stiffdice archive paper
-  stiffdice verify results/paper
+  stiffdice diff stiff.h5 softer.h5
   stiffdice bench
+  make archive STUDY=quick
+  stiffdice status quick
+  stiffdice verify results/quick
 """
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Says what is wrong in one line, and what was meant if that is near."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        choice = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+        meant = checks.meant(choice[1], re.findall(r"[a-z]+", choice[2])) if choice else ""
+        self.exit(2, f"{self.prog}: {message}{meant} (see {self.prog} --help)\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Refuse an option that is not known before another is missed, and by the command's name."""
+        words = sys.argv[1:] if args is None else args
+        own = "-" if self._subparsers else ""  # what follows a command is the command's
+        known = list(self._option_string_actions)
+        for word in itertools.takewhile(lambda word: word.startswith(own) and word != "--", words):
+            option = word.partition("=")[0]
+            if option.startswith("--") and not any(name.startswith(option) for name in known):
+                self.error(f"unrecognized arguments: {word}{checks.meant(option, known)}")
+        return super().parse_known_args(args, namespace)
 
 
 def _parser() -> argparse.ArgumentParser:

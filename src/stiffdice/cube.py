@@ -26,6 +26,13 @@ LINKS = (
 )
 
 
+def radius_of(side: float, geometry: str) -> float:
+    """Return the radius [m] at which a cube of this geometry has a side [m], to round-off: `Cube.side` solved for r."""
+    if geometry == "printed":
+        return math.sqrt(side) * math.sqrt(side + 2 * math.sqrt(2)) / 2
+    return side * math.sqrt(3) / 2
+
+
 @dataclass(frozen=True)
 class Cube:
     """A rigid cube.

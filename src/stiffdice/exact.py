@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stiffdice import checks
+from stiffdice import checks, flat_landing
 from stiffdice.compiled import by_tag, njit
 from stiffdice.contact import LAWS, Gated, Ungated
 from stiffdice.errors import InputError
@@ -31,14 +31,17 @@ from stiffdice.state import Physics, physics_of
 DEAD = 1e150
 
 
+_UNGATED, _GATED = flat_landing.APPROACH_DAMPING["ungated"], flat_landing.APPROACH_DAMPING["gated"]
+
+
 @njit
 def _all_nodes() -> float:
-    return 2.0
+    return _UNGATED
 
 
 @njit
 def _lower_nodes() -> float:
-    return 1.0
+    return _GATED
 
 
 # (law) -> how many times as strong the damping of a flat cube is on the way in as on the way out, where the four lower

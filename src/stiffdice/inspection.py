@@ -43,9 +43,9 @@ def _has_verdicts(dataset: xr.Dataset) -> bool:
 
 
 def _verdicts(dataset: xr.Dataset) -> list[str]:
-    if not _has_verdicts(dataset):
-        return ["  none: this file holds no runs"]
     counts = _verdict_counts(dataset)
+    if not counts:
+        return ["  none: this file holds no runs"]
     total = sum(counts.values())
     if total == 1:
         measures = [
@@ -85,9 +85,20 @@ def _ledger(dataset: xr.Dataset) -> list[str]:
 
 
 def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
-    """Return how many runs ended with each verdict, those that none ended with left out."""
+    """Return how many runs ended with each verdict, those that none ended with left out; nothing if it holds no runs.
+
+    In a judged sweep `verdict` is a coordinate, and how many runs ended so in each cell is in `verdicts`.
+    """
+    if not _has_verdicts(dataset):
+        return {}
     names = meanings_of(dataset.verdict)
-    counts = np.bincount(dataset.verdict.values.astype(int).ravel(), minlength=len(names))
+    if "verdict" not in dataset.dims:
+        counts = np.bincount(dataset.verdict.values.astype(int).ravel(), minlength=len(names))
+    elif "verdicts" in dataset:
+        counts = dataset.verdicts.sum([dim for dim in dataset.verdicts.dims if dim != "verdict"]).values
+        names = [names[value] for value in dataset.verdict.values]
+    else:
+        return {}
     return {name: int(count) for name, count in zip(names, counts, strict=True) if count}
 
 
@@ -118,7 +129,7 @@ def as_json(dataset: xr.Dataset) -> str:
         "attributes": attributes,
         "sizes": {str(name): size for name, size in dataset.sizes.items()},
         "values": {str(name): _number(variable) for name, variable in dataset.data_vars.items() if variable.ndim == 0},
-        "verdicts": _verdict_counts(dataset) if _has_verdicts(dataset) else {},
+        "verdicts": _verdict_counts(dataset),
         "variables": {
             str(name): {"dimensions": list(variable.dims), "units": variable.attrs.get("units")}
             for name, variable in dataset.variables.items()

@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffdice import checks
+from stiffdice import checks, stated
 from stiffdice.cube import Cube
 from stiffdice.errors import InputError
 from stiffdice.ground import Ground
@@ -105,13 +106,18 @@ class Launch:
 
 @dataclass(frozen=True)
 class Scene:
-    """A cube, a ground, a launch, gravity [m/s², along −z] and a duration [s]."""
+    """A cube, a ground, a launch, gravity [m/s², along −z] and a duration [s].
+
+    derived: what of it was given in other words, a line for each value (`stated`). No part of the scene: two scenes of
+    the same values are equal, and have one digest, however these were given.
+    """
 
     cube: Cube = field(default_factory=Cube)
     ground: Ground = field(default_factory=Ground)
     launch: Launch = field(default_factory=Launch)
     gravity: float = 9.8
     duration: float = 10.0
+    derived: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gravity", checks.number("gravity", self.gravity, "m/s²", at_least=0))
@@ -121,6 +127,7 @@ class Scene:
         """Return the scene as plain data, every key resolved; `from_mapping` gives the same scene back."""
         # A round trip through JSON turns the tuples into the lists that YAML has.
         mapping: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
+        del mapping["derived"]
         return mapping
 
     @property
@@ -131,12 +138,16 @@ class Scene:
 
     def with_ground(self, **values: Any) -> Scene:
         """Return the same scene on another ground: with_ground(stiffness=1e6, contact="gated")."""
-        return dataclasses.replace(self, ground=dataclasses.replace(self.ground, **values))
+        kept = tuple(line for line in self.derived if not line.startswith("ground."))
+        return dataclasses.replace(self, ground=dataclasses.replace(self.ground, **values), derived=kept)
 
 
 _SECTIONS: dict[str, Any] = {"cube": Cube, "ground": Ground, "launch": Launch}
 _TOP_KEYS = ("preset", *_SECTIONS, "gravity", "duration")
-_KEYS = {name: [part.name for part in dataclasses.fields(cls)] for name, cls in _SECTIONS.items()}
+_KEYS = {
+    name: [*(part.name for part in dataclasses.fields(cls)), *stated.INSTEAD.get(name, ())]
+    for name, cls in _SECTIONS.items()
+}
 
 
 def from_mapping(mapping: object, preset: str | None = None) -> Scene:
@@ -147,13 +158,25 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
     top = checks.known_keys("", _given(mapping), _TOP_KEYS)
     sections = {name: dict(checks.known_keys(name, _given(top.get(name)), _KEYS[name])) for name in _SECTIONS}
     chosen = preset if preset is not None else top.get("preset")
+    if "side" in sections["cube"]:
+        sections["cube"].setdefault("geometry", stated.GEOMETRY)
+    if "restitution" in sections["ground"] and chosen is None:
+        sections["ground"].setdefault("contact", stated.CONTACT)
     if chosen is not None:
         _apply_preset(checks.choice("preset", chosen, PRESETS), sections)
-    spin = sections["launch"].get("angular_momentum")
+    keys, derived = stated.cube(sections["cube"])
+    cube = Cube(**keys)
+    keys, of_ground = stated.ground(sections["ground"], cube)
+    launch = stated.launch(sections["launch"], cube)
+    spin = launch.get("angular_momentum")
     if isinstance(spin, Mapping):
-        sections["launch"]["angular_momentum"] = _random_spin(spin)
+        launch["angular_momentum"] = _random_spin(spin)
     rest = {key: top[key] for key in ("gravity", "duration") if key in top}
-    return Scene(**{name: cls(**sections[name]) for name, cls in _SECTIONS.items()}, **rest)
+    return Scene(cube, Ground(**keys), Launch(**launch), **rest, derived=derived + of_ground)
+
+
+# `[x, y, z] unit`, which is no YAML without quotes around it.
+_ONE_UNIT = re.compile(r"\s*\[[^][{}]*\]\s*[^\s\]#][^\]#]*")
 
 
 def _given(mapping: object) -> object:
@@ -204,7 +227,7 @@ def _override(data: Any, text: str) -> Any:
     if not equals or not all(keys):
         raise InputError(f"--set {text}: allowed is key.path=value, such as ground.stiffness=1e6")
     try:
-        value = yaml_file.parse(raw)
+        value = raw if _ONE_UNIT.fullmatch(raw) else yaml_file.parse(raw)
     except InputError as error:
         raise error.within(f"--set {text}") from None
     result = dict(checks.known_keys("", _given(data), _TOP_KEYS))
@@ -223,5 +246,7 @@ def _override(data: Any, text: str) -> Any:
         section[keys[1]] = {**(spin if isinstance(spin, dict) else {}), keys[2]: value}
     else:
         section[keys[1]] = value
+        for other in stated.excluded(keys[0], keys[1]):
+            section.pop(other, None)
     result[keys[0]] = section
     return result

@@ -17,7 +17,7 @@ from stiffdice import scene as scenes
 from stiffdice.criteria import tolerances_of
 from stiffdice.ensemble import phased, turned
 from stiffdice.errors import InputError, NotInstalledError
-from stiffdice.grid import Sweep
+from stiffdice.grid import Spans, Sweep
 from stiffdice.io import yaml_file
 from stiffdice.state import TURNING, start_of
 
@@ -92,6 +92,8 @@ def load(path: str | Path, schema: str | Path) -> Study:
     """
     if not NAME.fullmatch(Path(path).stem):
         raise InputError(f"{path}: allowed in a study's name are letters, digits, hyphens and underscores")
+    if not Path(path).exists():
+        raise InputError(_missing(Path(path)))
     data = yaml_file.load(path)
     _validate(data, schema, str(path))
     try:
@@ -118,6 +120,13 @@ def load(path: str | Path, schema: str | Path) -> Study:
         )
     except InputError as error:
         raise error.within(str(path)) from None
+
+
+def _missing(path: Path) -> str:
+    """Return what to say of a study that is not there: those that are, and which was meant if one is near."""
+    there = sorted(other.stem for other in path.parent.glob("*.yaml") if NAME.fullmatch(other.stem))
+    told = f"those in {path.parent}/ are {', '.join(there)}" if there else f"{path.parent}/ has none"
+    return f"{path}: there is no study {path.stem}; {told}{checks.meant(path.stem, there)}"
 
 
 def _installed(
@@ -204,6 +213,8 @@ def _told(error: Any) -> str:
         missing = [key for key in error.validator_value if key not in error.instance]
         return f"{where + '.' if where else ''}{missing[0]} is missing"
     allowed = error.schema.get("errorMessage")
+    if error.validator == "enum" and allowed:
+        allowed += checks.meant(error.instance, error.validator_value)
     if error.validator == "oneOf":
         return f"{where}: {allowed}"
     if "propertyNames" in error.absolute_schema_path:
@@ -299,7 +310,7 @@ def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) ->
     """Return a name if there is one such thing in the study; raises InputError otherwise."""
     if name is None or name not in names:
         allowed = " or ".join(names) or f"none: this study has no {kind}"
-        raise InputError(f"{where} = {checks.shown(name)}: allowed is {allowed}")
+        raise InputError(f"{where} = {checks.shown(name)}: allowed is {allowed}{checks.meant(name, names)}")
     return name
 
 
@@ -314,7 +325,8 @@ def _experiment(kind: str, left_out: list[str], name: str, experiment: Mapping[s
     )
     try:
         checks.choice("measure", planned.measure, registry)
-        scenes.load(planned.scene, planned.changes)
+        scene = scenes.load(planned.scene, planned.changes)
+        _refuse_restitution(scene, f"{kind} may take others")
         parameters = inspect.signature(registry[planned.measure].load()).parameters.values()
         known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
         checks.known_keys("options", planned.options, known)
@@ -398,6 +410,9 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
     if planned.horizon > scene.duration:
         raise InputError(f"horizon = {planned.horizon:g}: allowed is a number <= duration = {scene.duration:g} [s]")
+    _refuse_descending(planned.stiffness)
+    if any(column != (scene.ground.contact, scene.ground.stiffness) for column in planned.columns()):
+        _refuse_restitution(scene, "the sweep sets others")
     for key in ("stiffness", "contact"):
         for override in sweep.get("set", ()):
             if override.split("=")[0].strip() in ("ground", f"ground.{key}"):
@@ -412,6 +427,21 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
     launches = turned(scene, planned.model, planned.members)
     phased(planned.scene_of(longest[1]), planned.model, longest[0], planned.members, launches)
     return planned
+
+
+def _refuse_restitution(scene: scenes.Scene, reason: str) -> None:
+    """Raise InputError if the damping of a scene's ground follows from its restitution."""
+    if any(line.startswith("ground.damping") for line in scene.derived):
+        raise InputError(
+            f"scene: its ground.restitution is that of stiffness {scene.ground.stiffness:g} kg/s² and the "
+            f"{scene.ground.contact} law alone, and {reason}; give ground.damping"
+        )
+
+
+def _refuse_descending(stiffness: Spans) -> None:
+    for span in [stiffness] if isinstance(stiffness, Mapping) else stiffness:
+        if span["from"] > span["to"]:
+            raise InputError(f"stiffness.from = {span['from']:g}: allowed is a number <= to = {span['to']:g} [kg/s²]")
 
 
 def _model_of(sweep: Sweep) -> tuple[str, str]:

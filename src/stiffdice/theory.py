@@ -112,17 +112,3 @@ def contact_modes(scene: Scene, offsets: Array, touching: npt.NDArray[np.bool_ |
     rows = np.column_stack([np.full(len(arms), scene.cube.mass**-0.5), arms * scene.cube.moment_of_inertia**-0.5])
     squares: Array = np.linalg.eigvalsh(scene.ground.stiffness * rows.T @ rows)
     return np.maximum(squares, 0.0)  # round-off around the modes without a spring
-
-
-def restitution(zeta: float) -> float:
-    """Return e [1], speed out over speed in, of a flat bounce without gravity under the `gated` law.
-
-    zeta [1]: damping ratio c/(2mω) = D/√(S m) of the four nodes; not negative. The contact ends when the force is zero,
-    as the ground cannot pull (Schwager and Pöschel 2007, doi:10.1007/s10035-007-0065-z); their arctangent changes its
-    branch at ζ = 1/√2, where the same angle written as an arccosine does not.
-    """
-    if zeta == 1:
-        return math.exp(-2)
-    angle = math.acos(zeta) if zeta < 1 else math.acosh(zeta)
-    # Not √|1 − ζ²|: digits are lost near one, and the square may leave the range of doubles.
-    return math.exp(-2 * zeta / (math.sqrt(abs(1 - zeta)) * math.sqrt(1 + zeta)) * angle)

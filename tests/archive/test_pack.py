@@ -256,7 +256,12 @@ def test_an_archive_lies_where_no_study_does_unless_one_says_otherwise(own, monk
     ("arguments", "told"),
     [
         (["../tiny"], r"STUDY = \.\./tiny: allowed is the name"),
-        (["none"], r"config/none.yaml: No such file"),
+        (["none"], r"config/none.yaml: there is no study none; those in config/ are .*tiny"),
+        (["tiny", "-o", "-"], r"-o -: nothing is written to standard output"),
+        (
+            ["tiny", "-o", "config/tiny.yaml"],
+            r"config/tiny.yaml: is there already, and no such file of stiffdice; name",
+        ),
         (["tiny", "-o", "nowhere/a.zip"], r"the folder nowhere does not exist"),
     ],
 )
@@ -265,6 +270,18 @@ def test_bad_arguments_are_told_in_one_line(finished, monkeypatch, capsys, argum
     assert main(["archive", *arguments]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert re.search(told, line)
+
+
+def test_an_archive_replaces_an_archive_and_another_zip_only_by_force(finished, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(finished[0])
+    target = tmp_path / "a.zip"
+    with zipfile.ZipFile(target, "w") as other:
+        other.writestr("notes.txt", "mine")
+    before = target.read_bytes()
+    assert main(["archive", "tiny", "-o", str(target)]) == 2
+    assert target.read_bytes() == before
+    assert main(["archive", "tiny", "-o", str(target), "--force"]) == 0
+    assert main(["archive", "tiny", "-o", str(target)]) == 0
 
 
 def test_out_of_the_project_the_command_says_so(tmp_path, monkeypatch, capsys):

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from stiffdice.commands import changes, numbers
+from stiffdice.commands import changes, numbers, output
 from stiffdice.errors import InputError
+
+if TYPE_CHECKING:
+    from stiffdice.scene import Scene
 
 EXAMPLES = """\
 examples:
   stiffdice advise config/scenes/figure-04.yaml --error 1%
-  stiffdice advise --stiffness 1e6 --mass 0.02 --contact gated --error 1e-6
-  stiffdice advise my-cube.yaml --error 1% --horizon 2 --run -o out.h5
-  stiffdice advise my-cube.yaml --scheme symplectic_euler --json
+  stiffdice advise --stiffness 1e6 --mass '20 g' --contact gated --error 1e-6
+  stiffdice advise --side '16 mm' --mass '5 g' --restitution 0.5 --position '0,0,30 cm' --velocity 1,0,0 --error 0.1%
+  stiffdice advise config/scenes/figure-09.yaml --error 1% --horizon 2 --run -o advised.h5
+  stiffdice advise config/scenes/figure-09.yaml --scheme symplectic_euler --json
 
 The error is the root mean square distance of the cube's centre from the exact path, over evenly spread times from the
 launch to the end (or the horizon), in radii of the cube: 1% of a 1 m cube is 1 cm. A tumbling cube is chaotic, and a
@@ -26,17 +31,21 @@ the promise is found broken; 2 for bad input.
 # Keys of the scene that `advise` has an option for, and what they are.
 _KEYS = {
     "stiffness": ("ground.stiffness", "of the ground, per node [kg/s²]"),
+    "contact_time": ("ground.contact_time", "with --restitution, in place of a stiffness: of a flat landing [s]"),
     "damping": ("ground.damping", "of the ground, per node [kg/s]"),
+    "restitution": ("ground.restitution", "in place of a damping: speed up over speed down of a flat landing"),
     "friction": ("ground.friction", "coefficient of friction"),
     "contact": ("ground.contact", "ungated or gated"),
     "mass": ("cube.mass", "of the cube [kg]"),
     "radius": ("cube.radius", "of the cube, centre to corner [m]"),
+    "side": ("cube.side", "of the cube, in place of its radius [m]"),
     "position": ("launch.position", "where the centre starts, as 0,0,3 [m]"),
     "velocity": ("launch.velocity", "of the launch, as 5,0,5 [m/s]"),
     "spin": ("launch.angular_momentum", "angular momentum of the launch, as 0.1,0,0 [kg m²/s]"),
     "duration": ("duration", "of the run [s]"),
 }
 _VECTORS = ("position", "velocity", "spin")
+_EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -51,7 +60,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     advise.add_argument(
         "scene", metavar="SCENE.yaml", nargs="?", help="the physical problem; without it, the options below"
     )
-    advise.add_argument("--error", default="1%", metavar="X", help="as 1%%, 0.01 or 1e-6 of the radius (default: 1%%)")
+    advise.add_argument(
+        "--error", default="1%", metavar="X", help="as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
+    )
     advise.add_argument("--horizon", metavar="T", help="until when to keep it [s] (default: the duration)")
     advise.add_argument("--scheme", metavar="NAME", help="advice for this scheme alone (default: all are compared)")
     advise.add_argument(
@@ -59,11 +70,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
     advise.add_argument("--json", action="store_true", help="the same for programs")
+    output.add_force(advise)
     changes.add(advise)
-    numbers = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
+    scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
+    either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
     for name, (_, text) in _KEYS.items():
         metavar = "X,Y,Z" if name in _VECTORS else "LAW" if name == "contact" else "X"
-        numbers.add_argument(f"--{name}", metavar=metavar, help=text)
+        either.get(name, scene).add_argument(f"--{name.replace('_', '-')}", metavar=metavar, help=text)
     advise.set_defaults(call=_advise)
 
 
@@ -85,28 +98,39 @@ def _named(options: argparse.Namespace, changes: Sequence[str]) -> list[str]:
     return [options.scene, *preset, *(word for change in changes for word in ("--set", change))]
 
 
+def _in_radii(text: str, scene: Scene) -> str:
+    """Return an error as a part of the radius if it is given as a length, any other as it is."""
+    from stiffdice import units
+
+    if units.has_unit(text, "m"):
+        return repr(units.in_si(text, "m") / scene.cube.radius)
+    if comma := units.decimal_comma(text):
+        raise InputError(f"--error = {text}: {comma}")
+    return text
+
+
 def _advise(options: argparse.Namespace) -> int:
     from stiffdice import scene as scenes
-    from stiffdice.io.write import check_target
+    from stiffdice.io import seal
 
     changes = _given(options)
     if options.scene is None:
         scene = scenes.changed({}, changes, options.preset)
     else:
         scene = scenes.load(options.scene, changes, options.preset)
-    horizon = None if options.horizon is None else numbers.number("--horizon", options.horizon)
+    horizon = None if options.horizon is None else numbers.number("--horizon", options.horizon, "s")
     if options.output is not None and not options.run:
         raise InputError("-o: a file is written with --run only")
-    target = None if options.output is None else check_target(options.output)
-    if target is not None and options.scene is not None and target.exists() and target.samefile(options.scene):
-        raise InputError(f"{target}: is the scene itself; name another file for the output")
+    target = None
+    if options.output is not None:
+        target = output.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
 
     # These take about a second to import; bad input is told before.
     from stiffdice import advice, advice_text
     from stiffdice.progress import Notes, Progress
     from stiffdice.verdict import Verdict
 
-    error = advice.parsed_error(options.error)
+    error = advice.parsed_error(_in_radii(options.error, scene))
     with Notes("advise: trying") as notes:
         given = advice.advise(scene, error, horizon=horizon, scheme=options.scheme, tell=notes.show)
     check = None
@@ -123,6 +147,8 @@ def _advise(options: argparse.Namespace) -> int:
     if options.json:
         print(advice_text.as_json(given, check))
     else:
+        for line in scene.derived:
+            print(line)
         print(advice_text.as_text(given, _named(options, changes)))
         if check is not None:
             print("\n" + advice_text.check_as_text(check))

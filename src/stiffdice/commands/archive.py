@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+from stiffdice.commands import output
 
 if TYPE_CHECKING:
     from stiffdice.archive.sizes import Sizes
 
 EXAMPLES = """\
 examples:
-  stiffdice archive paper
-  stiffdice archive my-sweep -o my-sweep.crate.zip
-  stiffdice archive my-sweep --agent "Ada Lovelace"
-  make archive STUDY=my-sweep    # runs the study and makes its report first
+  make report STUDY=quick           # runs the study and makes its report
+  stiffdice archive quick
+  stiffdice archive quick -o quick.crate.zip --agent "Ada Lovelace"
+  make archive STUDY=quick          # all of it
 """
 
 
@@ -31,6 +34,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     archive.add_argument(
         "-o", dest="output", metavar="FILE.zip", help="default: results/archives/STUDY-VERSION.crate.zip"
     )
+    output.add_force(archive)
     archive.add_argument("--agent", metavar="NAME", help="who ran the study, if the archive is to say so")
     archive.add_argument("--json", action="store_true", help="sizes for programs")
     archive.set_defaults(call=_archive)
@@ -38,7 +42,6 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def _archive(options: argparse.Namespace) -> None:
     import json
-    from pathlib import Path
 
     from stiffdice import __version__
     from stiffdice import study as studies
@@ -55,7 +58,7 @@ def _archive(options: argparse.Namespace) -> None:
     study = studies.load(root / "config" / f"{options.study}.yaml", schema)
     target = pack.default_target(study, root, __version__)
     if options.output:
-        target = Path(options.output)
+        target = output.target_of(options.output, options.force, _is_archive)
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
     packed = pack.pack(study, root, target, options.agent)
@@ -66,6 +69,17 @@ def _archive(options: argparse.Namespace) -> None:
         print(line)
     print(text_of(packed.sizes))
     print(f"{packed.path}: {in_megabytes(packed.size)}")
+
+
+def _is_archive(path: Path) -> bool:
+    import zipfile
+
+    from stiffdice.archive import crate
+
+    if not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as archive:
+        return crate.NAME in archive.namelist()
 
 
 def _plain(sizes: Sizes) -> dict[str, object]:

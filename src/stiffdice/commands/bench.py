@@ -6,12 +6,13 @@ import argparse
 from pathlib import Path
 
 from stiffdice.bench import BENCHMARKS
+from stiffdice.commands import output
 
 EXAMPLES = """\
 examples:
   stiffdice bench
   stiffdice bench listing engines
-  stiffdice bench --against another-machine.h5
+  stiffdice bench --quick --folder quick-bench
 
 Times are medians of rounds in which everything takes turns; let nothing else run meanwhile. Stored are an HDF5 file
 with every sample, a page and a table, named by the time; what changed since the last one there is told, row by row,
@@ -41,12 +42,14 @@ def _bench(options: argparse.Namespace) -> None:
     for name in options.names:
         checks.choice("NAME", name, BENCHMARKS)
 
+    folder = output.name_of("--folder", options.folder)
+
     # These take about a second to import; bad input is told before.
     from stiffdice.bench.run import bench
     from stiffdice.progress import Notes
 
     against = None if options.against is None else Path(options.against)
     with Notes("bench:") as notes:
-        stored = bench(Path(options.folder), names=options.names, quick=options.quick, against=against, tell=notes.show)
+        stored = bench(folder, names=options.names, quick=options.quick, against=against, tell=notes.show)
     print(stored.page)
     print(f"{stored.path}: stored, with the same as .md and .csv")

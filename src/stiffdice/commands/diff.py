@@ -7,9 +7,12 @@ from pathlib import Path
 
 EXAMPLES = """\
 examples:
-  stiffdice diff mine.h5 theirs.h5
-  stiffdice diff results/paper ../before/results/paper
-  stiffdice diff mine.zip theirs.zip --json
+  stiffdice run config/scenes/figure-09.yaml -o listed.h5
+  stiffdice run config/scenes/figure-09.yaml --preset as_written -o written.h5
+  stiffdice diff listed.h5 written.h5
+  make study STUDY=quick
+  cp -r results/quick before
+  stiffdice diff before results/quick --json
 
 The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. A unit in the last place
 (ulp) is the step from one double to the next. The shards of a sweep are compared cell by cell, however the cells are

@@ -6,9 +6,11 @@ import argparse
 
 EXAMPLES = """\
 examples:
+  stiffdice run config/scenes/figure-04.yaml -o throw.h5
   stiffdice inspect throw.h5
-  stiffdice inspect results/paper/sweep/sweep.h5
   stiffdice inspect throw.h5 --json
+  make study STUDY=quick
+  stiffdice inspect results/quick/sweeps/steps-needed/sweep.h5
 """
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-EXAMPLES = """\
+from stiffdice import __version__
+
+EXAMPLES = f"""\
 examples:
-  stiffdice rebuild paper-0.1.0.crate.zip
-  stiffdice rebuild paper-0.1.0.crate.zip --cores 4 -o again
+  make archive STUDY=quick
+  stiffdice rebuild results/archives/quick-{__version__}.crate.zip
+  stiffdice rebuild results/archives/quick-{__version__}.crate.zip --cores 4 -o again
 
 It EXECUTES code of the archive, as `make` would: do so only with one from people that you trust. `stiffdice verify`
 executes nothing of it. The archive is checked first, and not run if anything in it fails. The run has no network, and
@@ -33,8 +36,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def _rebuild(options: argparse.Namespace) -> int:
-    from stiffdice.commands import numbers
+    from stiffdice.commands import numbers, output
 
+    if options.output is not None:
+        output.name_of("-o", options.output)
     cores = numbers.whole("--cores", options.cores)
 
     # This takes about a second to import; bad input is told before.

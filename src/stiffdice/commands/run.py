@@ -6,15 +6,15 @@ import argparse
 import shlex
 import sys
 
-from stiffdice.commands import changes, numbers
-from stiffdice.errors import InputError
+from stiffdice.commands import changes, numbers, output
 
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
   stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
-  stiffdice run my-cube.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o out.h5
-  stiffdice run my-cube.yaml --simulator mujoco --preset as_written --steps 20000 -o theirs.h5
+  stiffdice run config/scenes/figure-04.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o turning.h5
+  stiffdice run config/scenes/figure-09.yaml --set ground.restitution=0.5 --dt '0.1 ms' -o half.h5
+  stiffdice run config/scenes/figure-09.yaml --simulator numpy --preset as_written --steps 2000 -o theirs.h5
 
 The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
 its verdict; 2 for bad input.
@@ -51,7 +51,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
         "or exact where that is known (default: symplectic_euler; another engine has its own)",
     )
-    run.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
+    steps = run.add_mutually_exclusive_group()
+    steps.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
+    steps.add_argument("--dt", metavar="H", help="in place of --steps: the longest step, as 1e-4 or '0.1 ms' [s]")
     run.add_argument(
         "--tolerance",
         metavar="X",
@@ -67,6 +69,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         action="store_true",
         help="book where the energy goes, for every bounce and for the run (takes some times as long)",
     )
+    output.add_force(run)
     changes.add(run)
     run.set_defaults(call=_run)
 
@@ -74,13 +77,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def _run(options: argparse.Namespace) -> None:
     from stiffdice import checks
     from stiffdice import scene as scenes
-    from stiffdice.io.write import check_target
+    from stiffdice.io import seal
 
     scene = scenes.load(options.scene, options.overrides, options.preset)
-    steps = numbers.whole("--steps", options.steps)
-    target = check_target(options.output)
-    if target.exists() and target.samefile(options.scene):
-        raise InputError(f"{target}: is the scene itself; name another file for the output")
+    steps, note = numbers.whole("--steps", options.steps), ""
+    if options.dt is not None:
+        steps, note = numbers.steps_of(options.dt, scene.duration)
+    target = output.target_of(options.output, options.force, seal.is_sealed, options.scene)
 
     # These take about a second to import; bad input is told before.
     from stiffdice import ledger, requirement, run_text, schemes, simulators
@@ -98,7 +101,9 @@ def _run(options: argparse.Namespace) -> None:
         if options.every is None
         else checks.count("every", numbers.whole("--every", options.every), at_most=steps)
     )
-    tolerance = schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance)
+    tolerance = (
+        schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance, "1")
+    )
     method = scheme if options.simulator == simulators.OURS else ""
     model, _ = requirement.chosen(options.model, [scene], scene.duration / steps)
     simulators.check_fit(options.simulator, scheme, scene, model)
@@ -120,6 +125,8 @@ def _run(options: argparse.Namespace) -> None:
         books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
+    for line in filter(None, [*scene.derived, note]):
+        print(line)
     if options.model == requirement.AUTO:
         print(run.model_reason)
     print("\n".join(run_text.lines(run, str(target), _advise(options))))

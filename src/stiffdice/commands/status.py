@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
 examples:
-  stiffdice status                  every study that has results, a line each
-  stiffdice status paper
-  stiffdice status paper --watch
-  stiffdice status paper --json
+  stiffdice status                  # every study that has results, a line each
+  make study STUDY=quick
+  stiffdice status quick
+  stiffdice status quick --watch
+  stiffdice status quick --json
 
 exit status: 0 all is done; 1 something failed; 3 something is not done yet; 2 bad input
 """

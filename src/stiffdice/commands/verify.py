@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-EXAMPLES = """\
+from stiffdice import __version__
+
+EXAMPLES = f"""\
 examples:
-  stiffdice verify paper-0.1.0.crate.zip
-  stiffdice verify results/paper
+  make archive STUDY=quick
+  stiffdice verify results/archives/quick-{__version__}.crate.zip
+  stiffdice verify results/quick
+  stiffdice run config/scenes/figure-04.yaml -o throw.h5
   stiffdice verify throw.h5 --json
 
 Nothing of an archive is executed. Exit status: 0 if nothing fails, 1 if something fails, 2 if it cannot be read

@@ -19,6 +19,6 @@ def enum_attributes(long_name: str, meanings: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def meanings_of(variable: xr.DataArray) -> list[str]:
+def meanings_of(variable: xr.DataArray | xr.Variable) -> list[str]:
     """Return what the values 0, 1, ... of an enum mean."""
     return str(variable.attrs["flag_meanings"]).split()

@@ -173,6 +173,8 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         "hop_height_units": "m",
         "verdict_text": Verdict(run.verdict[0]).sentence,
     }
+    if run.scene.derived:
+        attributes["scene_derived"] = "; ".join(run.scene.derived)
     return xr.Dataset(variables, coordinates, attributes)
 
 

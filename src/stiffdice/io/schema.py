@@ -102,6 +102,7 @@ KINDS: dict[str, Kind] = {
             "tolerance": Attribute(NUMBER, RECOMMENDED),
             "hop_height": Attribute(NUMBER, RECOMMENDED),
             "verdict_text": Attribute(TEXT, RECOMMENDED),
+            "scene_derived": Attribute(TEXT, OPTIONAL),
         },
         {
             "time": Variable(_TIME, "f8", "s"),

@@ -44,7 +44,10 @@ class _Loader(yaml.SafeLoader):
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, str):
-                raise InputError(f"{_line(key_node)}: a key must be a word; put quotes around a number that is one")
+                raise InputError(
+                    f"{_line(key_node)}: a key must be a word; a decimal comma is written as a point, and a "
+                    "number that is a key in quotes"
+                )
             if key in seen:
                 raise InputError(f"{_line(key_node)}: key {key} is given twice")
             seen.add(key)

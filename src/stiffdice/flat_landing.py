@@ -1,0 +1,68 @@
+"""A flat landing without gravity: its restitution and its duration, and the ground that has them.
+
+Four nodes touch the ground at once. Along the normal the cube is a damped oscillator, z'' + 2ζω z' + ω² z = 0 with
+ω² = 4S/m and ζ = D/√(S m), from z = 0 at speed v inwards, on a ground that cannot pull: contact ends when its force is
+zero, not at the surface (Schwager and Pöschel 2007, doi:10.1007/s10035-007-0065-z). With ω_d = ω√(1 − ζ²),
+
+- it turns, z' = 0, when ω_d t = arccos ζ, and from there takes the same time to zero force, z'' = 0: with ζ = cos φ,
+  z ∝ exp(−ζωt) sin ω_d t has tan ω_d t = tan φ and tan 2φ. So t = arccos ζ/ω_d for either leg, whose speed, damping
+  and time are those of the other run backwards;
+- z'² + 2ζω z z' + ω² z² falls as exp(−2ζωt), and is v² at the surface and u² at zero force, so that
+  e = u/v = exp(−ζ_in ω t_in − ζ ω t_out), and the cube keeps that speed on its way up to the surface.
+
+The arctangents of the paper change their branch at ζ = 1/√2; the same angle written as an arccosine does not, and
+arcosh ζ/√(ζ² − 1) takes its place above ζ = 1. Under the `ungated` law the four upper nodes are damped, too, as long as
+the cube falls: ζ_in = 2ζ.
+"""
+
+from __future__ import annotations
+
+import math
+
+# How many times as strong the damping of a flat cube is on the way in as on the way out, by contact law.
+APPROACH_DAMPING = {"ungated": 2.0, "gated": 1.0}
+
+
+def leg(zeta: float) -> float:
+    """Return how long one leg takes [1/ω], surface to turn or turn to zero force, at a damping ratio ζ >= 0 [1]."""
+    if zeta == 1:
+        return 1.0
+    angle = math.acos(zeta) if zeta < 1 else math.acosh(zeta)
+    # Not √|1 − ζ²|: digits are lost near one, and the square may leave the range of doubles.
+    return angle / (math.sqrt(abs(1 - zeta)) * math.sqrt(1 + zeta))
+
+
+def duration(law: str, zeta: float) -> float:
+    """Return how long the contact lasts [1/ω], until its force is zero. law: contact law; zeta [1]: on the way out."""
+    return leg(APPROACH_DAMPING[law] * zeta) + leg(zeta)
+
+
+def restitution(law: str, zeta: float) -> float:
+    """Return e [1], speed out over speed in. law: contact law; zeta [1]: damping ratio on the way out."""
+    return math.exp(-_loss(law, zeta))
+
+
+def _loss(law: str, zeta: float) -> float:
+    """Return −ln e."""
+    approach = APPROACH_DAMPING[law] * zeta
+    return approach * leg(approach) + zeta * leg(zeta)
+
+
+def damping_ratio(law: str, restitution: float) -> float:
+    """Return the ζ [1] with a restitution in (0, 1], to round-off: −ln e grows with ζ, and is bisected."""
+    wanted = -math.log(restitution)
+    low, high = 0.0, math.exp(wanted / 2)  # −ln e >= 2 ln 2ζ, and at ζ = 1 it is two at least
+    while low < (middle := low + (high - low) / 2) < high:
+        low, high = (middle, high) if _loss(law, middle) < wanted else (low, middle)
+    return high if wanted > 0 else 0.0
+
+
+def damping(law: str, restitution: float, stiffness: float, mass: float) -> float:
+    """Return D [kg/s] per node, of a ground with a restitution [1] and a stiffness [kg/s²], for a cube's mass [kg]."""
+    return damping_ratio(law, restitution) * math.sqrt(stiffness) * math.sqrt(mass)
+
+
+def stiffness(law: str, restitution: float, contact_time: float, mass: float) -> float:
+    """Return S [kg/s²] per node, of a ground with a restitution [1] and a contact time [s], for a cube's mass [kg]."""
+    omega = duration(law, damping_ratio(law, restitution)) / contact_time
+    return mass * omega * omega / 4
