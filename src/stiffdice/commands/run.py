@@ -61,6 +61,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
     )
     run.add_argument(
+        "--budget",
+        metavar="N",
+        help="most force evaluations of a run by event, exact or scipy, which take steps of their own, and most steps "
+        "of any other; a run that needs more is stored with the verdict undecided (default: 1e7; all steps)",
+    )
+    run.add_argument(
         "--ledger",
         action="store_true",
         help="book where the energy goes, for every bounce and for the run (takes some times as long)",
@@ -95,6 +101,7 @@ def _run(options: argparse.Namespace) -> None:
         checks.choice("--ledger: scheme", scheme, ledger.BOOKED)
     every = default_every(steps) if options.every is None else numbers.whole("--every", options.every)
     tolerance = schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance)
+    budget = None if options.budget is None else numbers.whole("--budget", options.budget)
     with Progress() as progress:
         run = simulate(
             scene,
@@ -104,11 +111,12 @@ def _run(options: argparse.Namespace) -> None:
             steps=steps,
             tolerance=tolerance,
             every=every,
+            budget=budget,
             progress=progress.show,
         )
     dataset = run_dataset(run)
     if options.ledger:
-        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
+        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps, budget=int(run.steps_done[0]))
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
     if options.model == AUTO:
