@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from stiffdice import schemes
+from stiffdice.advice import advise
 from stiffdice.cli import main
+from stiffdice.errors import InputError
 from stiffdice.io.read import open_file
 from stiffdice.scene import from_mapping
 from stiffdice.schemes import own_steps
@@ -101,6 +103,20 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
     with pytest.raises(SystemExit):
         main(["run", "--help"])
     assert "default: 1e7" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("kind", EXTREMES)
+@pytest.mark.parametrize("law", ["gated", "ungated"])
+def test_advise_ends_soon_whatever_the_scene(kind, law):
+    """With advice, for a part of the time at least, or by saying that it finds no path."""
+    begun = time.process_time()
+    try:
+        advice = advise(extreme(kind, law), 0.01, scheme="event")
+    except InputError as refused:
+        assert "no path" in str(refused)
+    else:
+        assert 0 < advice.horizon <= advice.duration
+    assert time.process_time() - begun < 60  # compiling included
 
 
 LONG = {

@@ -79,7 +79,7 @@ def march(
             goes_on &= _look(law, physics, states, ensemble, m, *watched[:4], references, every, samples)
             chunk = min(_MOST, 2 * chunk)
             if progress is not None:
-                progress((m + asked / most) / count)
+                progress((m + watched.steps_done[m] / most) / count)
 
 
 def _known(states: States) -> int:
