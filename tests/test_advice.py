@@ -8,13 +8,15 @@ import json
 import numpy as np
 import pytest
 
-from stiffdice import limits, theory
+from stiffdice import limits, schemes, theory
+from stiffdice import pilot as pilot_module
 from stiffdice.advice import EXTRAPOLATED, MEASURED, advise, check, parsed_error, run_advised
 from stiffdice.advice_text import as_json, as_text, check_as_text, command
 from stiffdice.cli import main
 from stiffdice.errors import InputError
 from stiffdice.pilot import SAMPLES, curve, flown, tried
 from stiffdice.scene import Scene, from_mapping
+from stiffdice.simulate import simulate
 
 SPIN = {"angular_momentum": [0.3, 0.5, 0.2], "node_velocity": "rigid"}
 
@@ -295,17 +297,87 @@ def test_no_command_without_an_advice():
 
 def test_a_pilot_that_takes_too_long_ends_and_advice_with_it():
     """A cube that chatters on stiff ground costs event a step for every swing."""
-    advice = advise(resting(stiffness=1e8), 1e-3, scheme="event", patience=0.1)
+    advice = advise(resting(stiffness=1e8), 1e-3, scheme="event", patience=200_000)
     assert 0 < advice.horizon < 3
-    assert "takes more than 0.1 s" in advice.cut
+    assert "takes more than 200,000 force evaluations" in advice.cut
+    again = advise(resting(stiffness=1e8), 1e-3, scheme="event", patience=200_000)
+    assert (again.horizon, again.best.tolerance, again.floor) == (advice.horizon, advice.best.tolerance, advice.floor)
     assert check(advice, run_advised(advice, advice.best)).kept
 
 
 def test_what_takes_too_long_is_no_option_where_another_scheme_knows_the_path():
     launch = {"position": [0, 0, 0.5177], "velocity": [0.3, 0, 0], "node_velocity": "rigid"}
     quiet = scene(stiffness=1e12, damping=2e3, friction=0, launch=launch)
-    advice = advise(quiet, 1e-6, scheme="event", patience=0.05)
+    advice = advise(quiet, 1e-6, scheme="event", patience=100_000)
     (option,) = advice.options
     assert (advice.best, option.keeps, option.error) == (None, False, None)
     assert "takes more than" in option.evidence
     assert advise(quiet, 1e-6, scheme="exact").best.error < 1e-9
+
+
+def held(**changes):
+    """Friction so strong that it holds corners, each landing at another phase of it."""
+    keys = {
+        "ground": {"stiffness": 2e4, "damping": 6, "friction": 0.86, "contact": "gated"},
+        "launch": {
+            "position": [0, 0, 2.124],
+            "velocity": [2.61, -1.72, 1.43],
+            "angular_momentum": [-0.04, 0.34, 1.3],
+            "orientation": [0.53, -0.35, 1.28],
+            "node_velocity": "rigid",
+        },
+        "duration": 3,
+    }
+    return from_mapping(keys | changes)
+
+
+def off_scipy(advice, run):
+    """Return how far a run is off SciPy's LSODA at the finest tolerance [radii]."""
+    kept = run.trajectory.step % (run.steps // SAMPLES) == 0
+    theirs = simulate(
+        advice.scene, model=advice.model, simulator="scipy", tolerance=schemes.FINEST, steps=SAMPLES, every=1
+    ).trajectory.state["position"]
+    return curve(run.trajectory.state["position"][kept], theirs, advice.scene.cube.radius)[-1]
+
+
+@pytest.mark.parametrize("error", [1e-8, 1e-7, 1e-5])
+def test_what_is_promised_where_friction_holds_is_true_by_another_method(error):
+    """Twins of one method share its error: LSODA found 3.6e-8 where they found 6e-10."""
+    advice = advise(held(), error, scheme="event")
+    run = run_advised(advice, advice.best)
+    found = check(advice, run)
+    truth = off_scipy(advice, run)
+    assert truth <= error
+    assert truth <= advice.best.error + advice.floor
+    assert truth <= found.found * (1 + 1e-9)
+    assert found.kept
+    assert "SciPy's LSODA" in advice.best.evidence
+    assert "lsoda at tolerance 1e-13" in found.against
+
+
+def test_the_floor_is_at_least_what_two_methods_differ_by():
+    pilot = flown(held())
+    assert pilot.other.scheme == "lsoda"
+    assert (pilot.floor >= pilot.error(pilot.other)).all()
+    assert flown(flat()).other.scheme == "event"
+
+
+def test_methods_that_part_end_the_promise(monkeypatch):
+    """Were LSODA another path, nothing would be promised from where it leaves ours."""
+    honest = pilot_module._by_another_method
+
+    def astray(problem, *given):
+        trial, name = honest(problem, *given)
+        late = np.arange(SAMPLES + 1) / SAMPLES * problem.duration > 2
+        return dataclasses.replace(trial, places=trial.places + 1e-4 * late[:, None]), name
+
+    monkeypatch.setattr(pilot_module, "_by_another_method", astray)
+    advice = advise(held(), 1e-6, scheme="event")
+    assert "event and SciPy's LSODA agree on the path until t = 3 s to 0.0002 radii only" in advice.cut
+    assert 1.9 <= advice.horizon <= 2
+
+
+def test_a_second_method_that_takes_too_long_is_said():
+    advice = advise(scene(), 1e-3, scheme="event", patience=5_000)
+    assert "by no second method: SciPy's LSODA takes more than 1,000 force evaluations" in advice.best.evidence
+    assert len(advice.paths) == 1

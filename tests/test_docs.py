@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -151,3 +152,34 @@ def test_make_targets_of_the_readme_exist():
     named |= set(re.findall(r"`make ([a-z-]+)", (ROOT / "README.md").read_text()))
     assert named
     assert named <= targets
+
+
+def shown(page: str) -> list[tuple[list[str], str]]:
+    """Return the arguments of each `advise` whose output a page shows, and that output."""
+    example = r"^```sh\n([^\n]*stiffdice advise [^\n]*)\n```\n\n```text\n(.*?)^```"
+    blocks = re.findall(example, page, re.MULTILINE | re.DOTALL)
+    return [(shlex.split(command.partition("stiffdice ")[2]), output) for command, output in blocks]
+
+
+_TIME = r"[\d.,e+]+ (ns|µs|ms|s|min|h|days|years)"
+
+
+def without_times(output: str) -> tuple[list[str], set[tuple[str, ...]]]:
+    """Return what an advice says of any machine: its lines, without times and round-off; of each scheme a row."""
+    head, _, table = output.strip().partition("\n\n")
+    head = re.sub(rf"(run time.*about )\S+ .*(, measured.* of ){_TIME}", r"\1TIME\2TIME", head)
+    head = re.sub(r"bear out to \S+ radii", "bear out to SOME radii", head)
+    rows, _, command = table.partition("\n\n")
+    parts = [re.split(r"\s{2,}", row.strip()) for row in rows.splitlines()]
+    kept = {tuple(part for part in row if not re.search(rf"^(> )?×|{_TIME}$", part)) for row in parts}
+    return [*head.splitlines(), command.strip()], kept
+
+
+def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
+    """But for times, which are another machine's."""
+    monkeypatch.chdir(ROOT)
+    examples = [example for page in ("README.md", "docs/advice.md") for example in shown((ROOT / page).read_text())]
+    assert examples
+    for arguments, output in examples:
+        assert main(arguments) == 0
+        assert without_times(capsys.readouterr().out) == without_times(output)

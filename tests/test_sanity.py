@@ -27,7 +27,7 @@ def made(scene, *, steps=2000, **options):
     run = simulate(from_mapping(scene), steps=steps, **options)
     found = run_dataset(run)
     if run.scheme in ledger.BOOKED:
-        books = ledger.keep(run.scene, model=run.model, scheme=run.scheme, steps=steps)
+        books = ledger.keep(run.scene, model=run.model, scheme=run.scheme, steps=steps, budget=int(run.steps_done[0]))
         found = found.assign(ledger.variables(books))
     return found
 
@@ -98,6 +98,8 @@ RUNS = {
         {"model": "sliding", "every": 1},
     ),
     "blown up": (BOUNCING, {"model": "sliding", "every": 1, "steps": 40}),
+    "out of budget": (BOUNCING, {"model": "sliding", "every": 1, "budget": 1500}),
+    "blown up, and out of budget": (BOUNCING, {"model": "sliding", "every": 1, "steps": 40, "budget": 35}),
     "out of range": (
         {**BOUNCING, "ground": {"contact": "ungated", "stiffness": 1e12}, "duration": 100},
         {"model": "sliding", "every": 1, "steps": 1000},

@@ -41,8 +41,8 @@ def test_the_end_is_the_last_sample():
 @pytest.mark.parametrize("every", [None, 7])
 def test_telling_progress_changes_nothing(every):
     told: list[float] = []
-    quiet = simulate(Scene(), model="sliding", steps=300_000, every=every)
-    loud = simulate(Scene(), model="sliding", steps=300_000, every=every, progress=told.append)
+    quiet = simulate(Scene(), model="sliding", steps=1_000_000, every=every)
+    loud = simulate(Scene(), model="sliding", steps=1_000_000, every=every, progress=told.append)
     np.testing.assert_array_equal(quiet.steps_computed, loud.steps_computed)
     np.testing.assert_array_equal(quiet.end, loud.end)
     for name, value in quiet.measures.items():

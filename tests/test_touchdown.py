@@ -18,7 +18,7 @@ RANDOM = np.random.default_rng(4)
 
 @njit(cache=True)
 def found(model, physics, launch, most):
-    return free_time(model, physics, launch[0], most)
+    return free_time(model, physics, launch[0], most)[0]
 
 
 def flying(spin=(0.0, 0.0, 0.0), position=(0, 0, 3), velocity=(5, 0, 5), gravity=9.8, **launch):

@@ -47,8 +47,8 @@ _RUNGS = 3
 # A scheme that needs no choice of steps is advised unless another takes less than this part of its time.
 _WORTH = 0.5
 
-# A run that takes longer [s] is timed once.
-_SLOW = 0.3
+# A run that takes longer [s] is timed once; a scene that takes more force evaluations is tried at fewer tolerances.
+_SLOW, _DEAR = 0.3, 1_000_000
 
 # Past this many steps counting them is no longer exact.
 _MOST_STEPS = float(checks.LARGEST_COUNT)
@@ -101,9 +101,9 @@ class Advice:
 
     asked [radii]; duration [s]: of the scene as given; horizon [s]: until when the error is promised. cut: why it is
     shorter than asked, or nothing. options: quickest first, those that keep the error before those that do not; best:
-    the one advised, None if none keeps the error. floor [radii]: how well the path is known. growth [1]: of an error
-    from after the first landing to the end, None with fewer than two. mode: the fastest contact. outside: where the
-    scene is out of the studied range, a sentence each.
+    the one advised, None if none keeps the error. floor [radii]: how well the path is known. paths: runs as good as
+    exact, by the methods that are compared. growth [1]: of an error from after the first landing to the end, None with
+    fewer than two. mode: the fastest contact. outside: where the scene is out of the studied range, a sentence each.
     """
 
     scene: Scene
@@ -116,6 +116,7 @@ class Advice:
     best: Option | None
     options: tuple[Option, ...]
     floor: float
+    paths: tuple[Trial, ...]
     landings: int
     growth: float | None
     mode: str
@@ -129,7 +130,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Check:
-    """A promise, and what was found: promised, expected and found error [radii]; against: a run of twice the cost."""
+    """A promise, and what was found: promised and found error [radii]; against: the runs that were compared with."""
 
     run: Run
     promised: float
@@ -162,15 +163,15 @@ def advise(
     *,
     horizon: float | None = None,
     scheme: str | None = None,
-    patience: float = PATIENCE,
+    patience: int = PATIENCE,
     budget: int = BUDGET,
     tell: Callable[[str], None] | None = None,
 ) -> Advice:
     """Return how to compute a scene to an error.
 
     error [radii of the cube], as in the module. horizon [s]: until when it is to be kept; None is the scene's duration.
-    scheme: advice for this one alone. patience [s]: longest pilot run. budget: steps that a run of fixed steps may
-    compute one by one. tell: called with what is tried next.
+    scheme: advice for this one alone. patience: force evaluations of the longest pilot run. budget: steps that a run of
+    fixed steps may compute one by one. tell: called with what is tried next.
 
     Raises InputError for an unknown name, a number out of range, and a scene of which no path can be computed.
     """
@@ -214,6 +215,7 @@ def advise(
         best,
         tuple(options),
         float(pilot.floor[-1]),
+        (pilot.best,) if pilot.other is None else (pilot.best, pilot.other),
         len(pilot.landings),
         _growth(pilot, shape),
         hardest.mode,
@@ -221,7 +223,7 @@ def advise(
     )
 
 
-def _known(scene: Scene, error: float, patience: float) -> tuple[Pilot, str]:
+def _known(scene: Scene, error: float, patience: int) -> tuple[Pilot, str]:
     """Return a pilot of the scene until its path is not known to the error any more, and why it ends before."""
     cut = ""
     while True:
@@ -230,7 +232,7 @@ def _known(scene: Scene, error: float, patience: float) -> tuple[Pilot, str]:
         except TooSlowError as out:
             # A little shorter, as its twins take longer.
             shorter = _rounded_down(0.8 * out.fraction * scene.duration)
-            cut = cut or f"a pilot run to t = {scene.duration:g} s takes more than {patience:g} s"
+            cut = cut or f"a pilot run to t = {scene.duration:g} s takes more than {patience:,} force evaluations"
         else:
             known = np.flatnonzero(pilot.floor <= error)
             last = int(known[-1]) if known.size else 0
@@ -239,21 +241,35 @@ def _known(scene: Scene, error: float, patience: float) -> tuple[Pilot, str]:
             if last == 0:
                 if not np.isfinite(pilot.floor[1]):
                     raise InputError("the motion leaves the range of doubles from the first steps on: no path to keep")
-                return pilot, f"double precision itself knows the path to {pilot.floor[1]:.1g} radii only"
+                return pilot, f"{_judge(pilot, error, 1)} the path to {pilot.floor[1]:.1g} radii only"
             shorter = _rounded_down(float(pilot.times[last]))
             cut = cut or _why_unknown(pilot, error)
         if not 0 < shorter < scene.duration:
-            raise InputError(f"duration = {scene.duration:g}: no path is found in {patience:g} s; try a --horizon [s]")
+            raise InputError(
+                f"duration = {scene.duration:g}: no path is found in {patience:,} evaluations; try a --horizon [s]"
+            )
         scene = dataclasses.replace(scene, duration=shorter)
 
 
 def _why_unknown(pilot: Pilot, error: float) -> str:
     if not np.isfinite(pilot.floor[-1]):
         return "the motion leaves the range of doubles"
+    if pilot.round_off[-1] <= error:
+        return (
+            f"{pilot.best.scheme} and {pilot.other_method} agree on the path until t = {pilot.scene.duration:g} s to "
+            f"{pilot.floor[-1]:.1g} radii only"
+        )
     return (
         f"round-off grows to {pilot.floor[-1]:.1g} radii until t = {pilot.scene.duration:g} s, over "
-        f"{len(pilot.landings)} landings: no scheme in double precision knows the path to {error:g} there"
+        f"{len(pilot.landings)} landings: no scheme in double precision knows the path to {error:g} there; a run to "
+        "the end is right statistically at most"
     )
+
+
+def _judge(pilot: Pilot, error: float, sample: int) -> str:
+    """Return what says how well a path is known at a sample, as the subject of a sentence, and its verb."""
+    by_twins = bool(pilot.round_off[sample] > error)
+    return "double precision itself knows" if by_twins else f"{pilot.best.scheme} and {pilot.other_method} agree on"
 
 
 def _rounded_down(seconds: float) -> float:
@@ -277,14 +293,14 @@ def _best(options: Sequence[Option]) -> Option | None:
     return own[0] if own and fit[0].seconds > _WORTH * own[0].seconds else fit[0]
 
 
-def _ladder(pilot: Pilot, patience: float) -> list[tuple[Trial, Array]]:
+def _ladder(pilot: Pilot, patience: int) -> list[tuple[Trial, Array]]:
     """Return runs of `event` from the finest tolerance on, each with its error, until one takes too long."""
     trials = [pilot.best] if pilot.best.scheme == "event" else []
     try:
         if not trials:
             trials.append(tried_patiently(pilot.scene, pilot.model, "event", 1, schemes.FINEST, patience))
         # A slow scene is tried at every fourth decade.
-        for decade in range(12, 0, -1 if trials[0].seconds < _SLOW else -4):
+        for decade in range(12, 0, -1 if trials[0].evaluations < _DEAR else -4):
             tolerance = float(f"1e-{decade}")
             trials.append(tried_patiently(pilot.scene, pilot.model, "event", 1, tolerance, patience))
     except TooSlowError:
@@ -300,17 +316,18 @@ def _shape(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]]) -> Array:
 
 def _exact(pilot: Pilot, kept: bool) -> Option:
     error, trial = float(pilot.floor[-1]), pilot.best
-    said = f"it is exact but for round-off, which twin runs (other intervals) show to be below {error:.1g} radii"
+    said = f"it is exact but for round-off, which {pilot.borne_out}"
     seconds = _seconds(pilot, trial)
     return Option("exact", SAMPLES, None, error, MEASURED, trial.evaluations, seconds, None, None, kept, said)
 
 
-def _event(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]], error: float, kept: bool, patience: float) -> Option:
+def _event(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]], error: float, kept: bool, patience: int) -> Option:
     """Return the cheapest tolerance from which on all finer ones keep an error."""
     if not ladder:
-        said = f"a run takes more than {patience:g} s here, a contact that lasts; none was made to the end"
-        finest = schemes.FINEST
-        return Option("event", SAMPLES, finest, None, THEORY, 0, patience, None, None, False, said)
+        said = f"a run takes more than {patience:,} force evaluations, a contact that lasts; none was made to the end"
+        trial = tried(pilot.scene, pilot.model, "event", SAMPLES, schemes.FINEST, budget=patience)
+        most, seconds = trial.evaluations, trial.seconds
+        return Option("event", SAMPLES, schemes.FINEST, None, THEORY, most, seconds, None, None, False, said)
     # Where the path comes from these runs, the finest is as far off as that may be.
     errors = [max(float(off[-1]), float(pilot.floor[-1])) for _, off in ladder]
     fit = [ladder[0]]
@@ -321,10 +338,7 @@ def _event(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]], error: float, ke
     k = min(range(len(fit)), key=lambda k: fit[k][0].evaluations)
     trial, kept = fit[k][0], kept and errors[k] <= error
     by = "exact" if pilot.best.scheme == "exact" else f"event at tolerance {schemes.FINEST:.0e}"
-    said = (
-        f"this very run was made, and compared with {by}, which twin runs (other intervals and tolerances) bear out to "
-        f"{pilot.floor[-1]:.1g} radii"
-    )
+    said = f"this very run was made, and compared with {by}, which {pilot.borne_out}"
     seconds = _seconds(pilot, trial)
     return Option(
         "event", SAMPLES, trial.tolerance, errors[k], MEASURED, trial.evaluations, seconds, None, None, kept, said
@@ -508,7 +522,7 @@ def run_advised(advice: Advice, option: Option, progress: Callable[[float], None
 
 
 def check(advice: Advice, run: Run, progress: Callable[[float], None] | None = None) -> Check:
-    """Compare a run of the advised scene with one of about twice the cost, or the finest there is.
+    """Compare a run of the advised scene with one of about twice the cost, and with the pilot's by other methods.
 
     A scheme of fixed steps is run at half the step: of a first-order error that shows one half, which is made good.
     Raises InputError for a run without a trajectory at the samples.
@@ -519,12 +533,13 @@ def check(advice: Advice, run: Run, progress: Callable[[float], None] | None = N
         finer = _run(advice, run.scheme, 2 * run.steps, None, progress)
         against = f"{run.scheme} with {2 * run.steps:,} steps"
     seen = 1.0 if run.scheme in ("event", "exact") else 2.0
-    return Check(run, advice.asked, seen * _distance(advice, run, finer), against)
-
-
-def _distance(advice: Advice, run: Run, other: Run) -> float:
-    """Return the root mean square distance of two runs [radii]; infinite where one ended early."""
-    return float(curve(_places(run), _places(other), advice.scene.cube.radius)[-1])
+    places, radius = _places(run), advice.scene.cube.radius
+    found = [seen * float(curve(places, _places(finer), radius)[-1])]  # infinite where one ended early
+    for path in advice.paths:
+        if path.scheme != run.scheme:
+            found.append(float(curve(places, path.places, radius)[-1]))
+            against += f", and {path.scheme} at tolerance {path.tolerance:.0e}"
+    return Check(run, advice.asked, max(found), against)
 
 
 def _finer(advice: Advice, run: Run, progress: Callable[[float], None] | None) -> tuple[Run, str]:

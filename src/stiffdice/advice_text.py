@@ -44,12 +44,12 @@ def _advised(advice: Advice) -> list[str]:
     if best is None:
         return [
             _row("scheme", f"none found that keeps {advice.asked:.3g} radii until t = {advice.horizon:g} s"),
-            _row("floor", f"double precision: the path itself is known to {_short(advice.floor)} radii"),
+            _row("floor", f"the path itself is known to {_short(advice.floor)} radii"),
         ]
     how = f"{best.steps:,} steps"
     if best.omega_h is None:
         tolerance = "" if best.tolerance is None else f"tolerance {best.tolerance:.0e}, "
-        how = f"{tolerance}{best.steps:,} steps (they only say when a state is kept)"
+        how = f"{tolerance}{best.steps:,} output intervals"
     error = (
         f"about {_short(best.error)} radii, {advice.asked:.3g} asked: root mean square distance of the centre from the "
         f"exact path until t = {advice.horizon:g} s"
@@ -63,8 +63,7 @@ def _advised(advice: Advice) -> list[str]:
 
 
 def _until(advice: Advice) -> str:
-    rest = "" if advice.best is None else "; a run to the end is right statistically at most"
-    return f"t = {advice.horizon:g} s of {advice.duration:g} s: {advice.cut}{rest}"
+    return f"t = {advice.horizon:g} s of {advice.duration:g} s: {advice.cut}"
 
 
 def _work(option: Option) -> str:
@@ -83,10 +82,13 @@ def _margin(option: Option, mode: str) -> str:
         return "none needed: nothing touches"
     if math.isinf(option.margin):
         return f"none needed: {option.scheme} is stable at any step; ωh = {option.omega_h:.2g} ({mode})"
-    limit = f"the limit {option.limit:.3g}" if option.limit else "a limit of 0, above which an error in contact grows"
-    if option.margin < 1:
-        return f"beyond {limit}: ωh = {option.omega_h:.2g} ({mode})"
-    return f"{_short(option.margin)} times: ωh = {option.omega_h:.2g} ({mode}), {limit}"
+    step = f"ωh = {option.omega_h:.2g} ({mode})"
+    if not option.limit:
+        return f"none: {step}, stability limit ωh = 0: an error in contact grows at any step"
+    limit = f"stability limit ωh = {option.limit:.3g}"
+    return (
+        f"none: {step}, beyond the {limit}" if option.margin < 1 else f"{_short(option.margin)} times: {step}, {limit}"
+    )
 
 
 def _table(advice: Advice) -> list[str]:

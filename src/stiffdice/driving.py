@@ -37,6 +37,11 @@ def check_fit(simulator: str, scene: Scene, model: str) -> None:
     peers.check_fit(simulator, scene, model)
 
 
+def own_steps(simulator: str) -> bool:
+    """Return whether an engine takes steps of its own between two states."""
+    return peers.ENGINES[simulator].own_steps
+
+
 def march(
     simulator: str,
     scene: Scene,
@@ -55,21 +60,33 @@ def march(
 ) -> None:
     """Let an engine run every member, one after another, and leave all as `simulate` does with its own steps.
 
-    watched: `simulate.Watched`. every: keep every K-th state in `samples`; 0 keeps none.
+    watched: `simulate.Watched`. budget: steps, or force evaluations of an engine that takes its own. every: keep every
+    K-th state in `samples`; 0 keeps none.
     """
     start, law, tag = adapter_of(simulator).start, LAWS[scene.ground.contact], MODELS[model]
-    count, most = len(ensemble), min(steps, budget)
+    own = own_steps(simulator)
+    count, most = len(ensemble), steps if own else min(steps, budget)
+    allowed = {"most": budget} if own else {}
     for m in range(count):
-        engine = start(scene, model, ensemble[m : m + 1].copy(), h, tolerance)
+        engine = start(scene, model, ensemble[m : m + 1].copy(), h, tolerance, **allowed)
         asked, chunk, goes_on = 0, _FIRST, True
         while asked < most and goes_on:
             states = np.zeros(min(chunk, most - asked), STATE)
             watched.evaluations[m] += engine.advance(states, 1)
             asked += len(states)
-            goes_on = _look(tag, law, physics, states, ensemble, m, *watched[:4], references, every, samples)
+            if own and watched.evaluations[m] >= budget:
+                states, goes_on = states[: _known(states)], False
+                watched.sight["work"][m] = watched.evaluations[m]
+            goes_on &= _look(tag, law, physics, states, ensemble, m, *watched[:4], references, every, samples)
             chunk = min(_MOST, 2 * chunk)
             if progress is not None:
-                progress((m + asked / most) / count)
+                progress((m + watched.steps_done[m] / most) / count)
+
+
+def _known(states: States) -> int:
+    """Return before which state a run was ended."""
+    ended = ~np.isfinite(states["position"]).all(axis=1)
+    return int(ended.argmax()) if ended.any() else len(states)
 
 
 @njit(cache=True)

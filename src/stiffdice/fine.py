@@ -12,6 +12,7 @@ from stiffdice.reference import SAMPLES, tabulated
 from stiffdice.scene import Scene
 from stiffdice.simulate import simulate
 from stiffdice.state import Array, Ensemble, States
+from stiffdice.verdict import Verdict
 
 # Errors at this tolerance do not matter: about a millionth of a step's, in contact. One made a hundred times as large
 # tells how large they are.
@@ -23,7 +24,7 @@ def references(scene: Scene, model: str, launches: States, horizon: float) -> tu
     """Return what to compare with until `horizon` [s], a REFERENCE for each launch, and a bound of their error [m].
 
     By the scheme `event`; the bound is the largest difference, for the first launch, from a run at a hundred times the
-    tolerance. Raises InputError if a run leaves the range of doubles.
+    tolerance. Raises InputError if a run leaves the range of doubles, or takes more than `schemes.BUDGET`.
     """
     places = np.empty((len(launches), SAMPLES + 1, 3))
     velocities = np.empty_like(places)
@@ -48,5 +49,5 @@ def _table(scene: Scene, model: str, launch: States, horizon: float, tolerance: 
         members=Ensemble(launch, np.zeros(1)),
     )
     if run.steps_done[0] < SAMPLES or run.trajectory is None:
-        raise InputError("trajectory: its reference left the range of doubles")
+        raise InputError(f"trajectory: its reference ended early, {Verdict(run.verdict[0]).sentence}")
     return run.trajectory.state["position"], run.trajectory.state["velocity"]

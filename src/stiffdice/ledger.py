@@ -39,6 +39,9 @@ BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
 
 LARGEST = 10_000  # bounces whose rows are kept
 
+# Steps after which compiled code returns, to see signals: a twentieth of a second.
+_AT_ONCE = 100_000
+
 # A step that books more [J] ends the ledger, so that all sums of what is booked stay within doubles.
 LARGEST_WORK = 1e290
 
@@ -71,6 +74,9 @@ _VIEW = np.dtype(
         ("clearance", np.float64),
     ]
 )
+
+# Where the books stand: steps done, bounces so far, and whether one is going on.
+_STAND = np.dtype([("done", np.int64), ("bounces", np.int64), ("in_bounce", np.bool_)])
 
 # Compensated sums over the steps of a run, of its flights, or of the bounce going on.
 _ACCOUNT = np.dtype([("total", np.float64, _SIZE), ("rest", np.float64, _SIZE)])
@@ -159,11 +165,12 @@ def keep(
     model: str = "tumbling",
     scheme: str = "symplectic_euler",
     steps: int = 10_000,
+    budget: int | None = None,
 ) -> Ledger:
     """Run the scene's own launch step by step and return the ledger of its energy.
 
-    model: `auto` takes the least that is exact for the scene. Raises InputError for an unknown name, a step count out
-    of range, and a model that the scene or the scheme does not allow.
+    model: `auto` takes the least that is exact for the scene. budget: steps at most; None does all. Raises InputError
+    for an unknown name, a step count out of range, and a model that the scene or the scheme does not allow.
     """
     checks.choice("scheme", scheme, BOOKED)
     steps = checks.count("steps", steps)
@@ -172,19 +179,16 @@ def keep(
     physics = physics_of(scene)
     accounts = np.zeros(3, _ACCOUNT)
     rows = np.zeros(min(LARGEST, steps), _ROW)
-    steps_done, bounce_count, launch_energy, end_energy = _keep(
-        schemes.SCHEMES[scheme],
-        MODELS[model],
-        LAWS[scene.ground.contact],
-        physics,
-        physics._replace(node_weight=0.0),
-        start_of(scene, model),
-        steps,
-        scene.duration / steps,
-        schemes.LAGS[scheme],
-        accounts,
-        rows,
-    )
+    tags = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
+    h, lag, stand = scene.duration / steps, schemes.LAGS[scheme], np.zeros(1, _STAND)
+    state, views = start_of(scene, model), np.zeros(2, _VIEW)
+    numbers = *tags, physics, physics._replace(node_weight=0.0)
+    launch_energy = _begin(*numbers[2:], state, lag * h, views)
+    end = steps if budget is None else budget
+    while _keep(*numbers, state, end, h, lag, stand, views, accounts, rows):
+        pass
+    steps_done, bounce_count = int(stand["done"][0]), int(stand["bounces"][0])
+    end_energy = _energy_of(views, steps_done)
     rows, booked = rows[:bounce_count], accounts["total"] + accounts["rest"]
     return Ledger(
         scene,
@@ -210,55 +214,67 @@ def keep(
 
 
 @njit(cache=True)
+def _begin(law: Any, physics: Physics, weightless: Physics, states: States, late: float, views: Any) -> float:
+    """View the launch, and return its energy [J]."""
+    _look(law, physics, weightless, states[0], late, views[0])
+    return _energy(views[0])
+
+
+@njit(cache=True)
+def _energy_of(views: Any, step: int) -> float:
+    """Return the energy after a step, the last or the one before [J]."""
+    return _energy(views[step % 2])
+
+
+@njit(cache=True)
 def _keep(
     scheme: Any,
     model: Any,
     law: Any,
     physics: Physics,
     weightless: Physics,
-    launch: States,
-    steps: int,
+    states: States,
+    end: int,
     h: float,
     lag: float,
+    stands: npt.NDArray[np.void],
+    views: npt.NDArray[np.void],
     accounts: npt.NDArray[np.void],
     rows: npt.NDArray[np.void],
-) -> tuple[int, int, float, float]:
-    """Do and book all steps; return steps done, bounces, and the energies of the first and the last state booked."""
-    state = launch[0]
+) -> bool:
+    """Do and book the next steps, up to number `end`; return whether there are more to do."""
+    state, stand = states[0], stands[0]
     late = lag * h
-    views = np.zeros(2, _VIEW)
     booked = np.zeros(_SIZE)
-    _look(law, physics, weightless, state, late, views[0])
-    launch_energy = _energy(views[0])
-    count = done = 0
-    in_bounce = False
-    row = rows[0]
-    for i in range(1, steps + 1):
+    row = rows[max(0, min(stand.bounces, rows.shape[0]) - 1)]
+    first = stand.done + 1
+    last = min(end, stand.done + _AT_ONCE)
+    for i in range(first, last + 1):
         before, after = views[(i - 1) % 2], views[i % 2]
         schemes.step(scheme, model, law, physics, state, h, schemes.TOLERANCE)
         _look(law, physics, weightless, state, late, after)
         _book(booked, physics, before, after, lag, h)
         if not _size(booked) < LARGEST_WORK:
-            break
-        done = i
+            return False
+        stand.done = i
         _add(accounts[_RUN], booked)
         if before.clearance > 0.0 and after.clearance > 0.0:
             _add(accounts[_FLIGHTS], booked)
             continue
-        if not in_bounce:
-            in_bounce = True
+        if not stand.in_bounce:
+            stand.in_bounce = True
             _open(accounts[_BOUNCE])
-            if count < rows.shape[0]:
-                row = rows[count]
+            if stand.bounces < rows.shape[0]:
+                row = rows[stand.bounces]
                 row.first_step = i - 1
                 row.energy_before = _energy(before)
                 row.largest_elastic_energy = before.elastic
-            count += 1
+            stand.bounces += 1
         _add(accounts[_BOUNCE], booked)
-        if count <= rows.shape[0]:
+        if stand.bounces <= rows.shape[0]:
             _write(row, accounts[_BOUNCE], i, after)
-        in_bounce = after.clearance <= 0.0
-    return done, count, launch_energy, _energy(views[done % 2])
+        stand.in_bounce = after.clearance <= 0.0
+    return last < end
 
 
 @njit

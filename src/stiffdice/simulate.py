@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -29,6 +28,10 @@ from stiffdice.scene import Scene
 from stiffdice.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
 from stiffdice.verdict import Verdict
 from stiffdice.watch import SIGHT
+
+# Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
+# of a second.
+_WORK = 200_000
 
 LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
@@ -129,7 +132,8 @@ def simulate(
     default ones. stop: end a run as soon as all of these criteria are decided at these tolerances. references: what
     `trajectory` compares with, one for all or one for each member (`reference.make`). hop_height [m]: rebounds that
     stay lower are not judged by `apex`; None takes a tenth of the cube's radius. budget: most steps to compute one by
-    one; a run that needs more ends undecided. progress: called with the fraction done, some times a second.
+    one, or about the most force evaluations of a scheme or an engine that takes its own steps; a run that needs more
+    ends undecided; None: all steps, or `schemes.BUDGET`. progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
     engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.
@@ -154,7 +158,7 @@ def simulate(
     samples = _room_for(steps, every)
     physics = physics_of(scene)
     h = scene.duration / steps
-    most = steps if budget is None else budget
+    most = simulators.budget_of(simulator, scheme, steps) if budget is None else budget
     watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64))
     watched.memory["limits"] = limits_of({} if stop is None else stop)
     if every is not None:
@@ -166,15 +170,14 @@ def simulate(
 
     leaping = True if leap or (leap is None and every is None) else None
 
-    def advance(stop: int) -> None:
-        _march(
+    def advance() -> bool:
+        goes_on: bool = _march(
             schemes.SCHEMES[scheme],
             *tags,
             physics,
             ensemble,
             *watched,
             compared,
-            stop,
             steps,
             h,
             tolerance,
@@ -183,6 +186,7 @@ def simulate(
             leaping,
             samples,
         )
+        return goes_on
 
     if simulator != simulators.OURS:
         limits = steps, h, tolerance, most, every or 0
@@ -196,11 +200,11 @@ def simulate(
         if leaping and not (alone or grounded) and watched_lanes.pays(scene, model, scheme, ensemble):
             left = watched_lanes.march(scene, model, physics, ensemble, watched, steps)
         if left > 0:
-            _in_chunks(advance, steps, scheme, progress)
+            _repeat(advance, None if progress is None else lambda: progress(watched.fraction(steps, h)))
 
     _finish(physics, ensemble, watched.memory, watched.sight)
     found = values(watched.memory)
-    spent = (watched.steps_done < steps) & (watched.steps_computed >= most)
+    spent = (watched.steps_done < steps) & (watched.spent >= most)
     method = scheme if simulator == simulators.OURS else None
     endings = endings_of(scene, model, method, steps, launches, ensemble, watched.memory, watched.sight)
     ended = judge.ending(found, endings | {Verdict.UNDECIDED: spent})
@@ -237,23 +241,13 @@ def _checked_tolerance(tolerance: float) -> float:
     return number
 
 
-def _in_chunks(
-    advance: Callable[[int], None], steps: int, scheme: str, progress: Callable[[float], None] | None
-) -> None:
-    """Advance to the last step; where progress is to be told, in parts that take a fifth of a second."""
-    if progress is None:
-        advance(steps)
-        return
-    reached, chunk, longest = 0, 20_000, steps
-    if scheme in schemes.OWN_STEPS:  # of which one may take as long as all before
-        chunk = longest = max(1, min(100, steps // 200))
-    while reached < steps:
-        begun = time.perf_counter()
-        reached = min(steps, reached + chunk)
-        advance(reached)
-        progress(reached / steps)
-        wanted = chunk * min(10.0, max(0.1, 0.2 / max(1e-4, time.perf_counter() - begun)))
-        chunk = min(longest, int(wanted) + 1)
+def _repeat(advance: Callable[[], bool], tell: Callable[[], None] | None) -> None:
+    """Advance as long as there is more to do; here, between two calls of compiled code, Python sees signals."""
+    goes_on = True
+    while goes_on:
+        goes_on = advance()
+        if tell is not None:
+            tell()
 
 
 class Watched(NamedTuple):
@@ -264,6 +258,17 @@ class Watched(NamedTuple):
     steps_done: npt.NDArray[np.int64]
     steps_computed: npt.NDArray[np.int64]
     evaluations: npt.NDArray[np.int64]
+
+    @property
+    def spent(self) -> Array:
+        """What each member has taken of its budget: steps computed, or the work of a scheme that takes its own."""
+        return np.maximum(self.steps_computed, self.sight["work"])
+
+    def fraction(self, steps: int, h: float) -> float:
+        """Return the part done of a run of so many steps of h [s], the mean over the members."""
+        pending = self.sight["pending"]
+        begun = np.where(pending > 0, 1 - pending / h, 0.0)
+        return float(np.mean((self.steps_done + begun) / steps))
 
 
 def _room_for(steps: int, every: int | None) -> States:
@@ -317,7 +322,6 @@ def _march(
     steps_computed: npt.NDArray[np.int64],
     evaluations: npt.NDArray[np.int64],
     references: npt.NDArray[np.void],
-    stop: int,
     steps: int,
     h: float,
     tolerance: float,
@@ -325,34 +329,42 @@ def _march(
     every: int,
     leap: Any,
     samples: States,
-) -> None:
-    """Advance every member to step `stop`, watching each step and keeping every K-th.
+) -> bool:
+    """Advance one member after another, watching each step and keeping every K-th; return whether there is more to do.
 
-    leap: whether motion that is known is taken at once, up to the next sample, and past `stop` if it lasts longer, so
-    that where to stop changes nothing; None if not, which leaves all of that out of what is compiled.
+    It ends after _WORK, so that Python can see a signal; where it ends changes nothing. leap: whether motion that is
+    known is taken at once, up to the next sample; None if not, which leaves all of that out of what is compiled.
     """
+    work = 0.0
     for m in range(ensemble.shape[0]):
         state, seen, remembered = ensemble[m], sight[m], memory[m]
         reference = references[m % references.shape[0]]
         undecided = open_of(remembered)
         done = steps_done[m]
         kept = (done // every + 1) * every if every > 0 else -1  # the step to keep next
-        while done < stop and undecided > 0 and remembered.finite[0] == 0.0:
-            left = budget - steps_computed[m]
-            if leap is not None:
+        while done < steps and undecided > 0 and remembered.finite[0] == 0.0:
+            if work >= _WORK:
+                steps_done[m] = done
+                return True
+            before = seen.work
+            left = budget - max(steps_computed[m], int(before))
+            if leap is not None and seen.pending == 0.0:
                 most = min(kept, steps) - done if every > 0 else steps - done
                 taken, flown, computed, evaluated = _leap(
                     scheme, model, law, physics, state, seen, remembered, reference, most, left, tolerance
                 )
             elif left > 0:
-                taken, flown, computed = 1, 0, 1
-                evaluated = schemes.step(scheme, model, law, physics, state, h, tolerance)
+                taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+                flown, computed = 0, taken
             else:
-                taken, flown, computed, evaluated = 0, 0, 0, 0
-            if taken == 0:
                 break
+            work += 1 + max(evaluated, seen.work - before)
             steps_computed[m] += computed
             evaluations[m] += evaluated
+            if seen.pending > 0.0:
+                continue
+            if taken == 0:
+                break
             step = done + taken
             watch.observe(seen, physics, state, step, flown)
             undecided -= criteria_observe(remembered, step, seen, model, law, physics, state, reference)
@@ -364,6 +376,7 @@ def _march(
                 samples[step // every] = state
                 kept += every
         steps_done[m] = done
+    return False
 
 
 @njit

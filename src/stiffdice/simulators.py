@@ -55,6 +55,13 @@ def lag_of(simulator: str, scheme: str) -> float:
     return schemes.LAGS[scheme] if simulator == OURS else float(adapter_of(simulator).LAG)
 
 
+def budget_of(simulator: str, scheme: str, steps: int) -> int:
+    """Return the most work of a run, unless told otherwise: steps, or force evaluations of what takes its own steps."""
+    if simulator == OURS:
+        return schemes.budget_of(scheme, steps)
+    return schemes.BUDGET if driving().own_steps(simulator) else steps
+
+
 def check_fit(simulator: str, scheme: str, scene: Scene, model: str) -> None:
     """Raise InputError where a scheme does not apply to a scene and model, or an engine cannot represent them."""
     if simulator == OURS:

@@ -39,8 +39,8 @@ def _earliest(clearance: float, speed: float, pull: float) -> float:
 
 
 @njit
-def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
-    """Return for how long [s], at most `most`, no node of a body in free flight goes below the ground.
+def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[float, int]:
+    """Return for how long [s], at most `most`, no node of a body in free flight goes below the ground; and advances.
 
     At the time returned, if it is less, a node is at the ground but for round-off and about to go below; 0 if one is
     below already.
@@ -51,7 +51,7 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
     if height > physics.reach:
         time = _earliest(height - physics.reach, speed, pull)
         if time >= most:
-            return most
+            return most, 0
     spin = state.angular_momentum
     wx, wy, wz = spin[0] / physics.inertia, spin[1] / physics.inertia, spin[2] / physics.inertia
     rate = math.sqrt(wx * wx + wy * wy + wz * wz) if models.turns(model) else 0.0
@@ -59,7 +59,9 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
     place = state.position
     length = abs(physics.nx * place[0]) + abs(physics.ny * place[1]) + abs(physics.nz * place[2])
     small = _ULPS * (length + abs(speed) * time + physics.reach)
-    for _ in range(_ADVANCES):
+    advances = 0
+    while advances < _ADVANCES:
+        advances += 1
         centre = height + time * (speed - 0.5 * pull * time)
         rising = speed - pull * time
         cosine, sine = math.cos(rate * time), math.sin(rate * time)
@@ -74,8 +76,8 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> float:
             break
         time += pace
         if time >= most:
-            return most
-    return time
+            return most, advances
+    return time, advances
 
 
 @njit

@@ -41,7 +41,7 @@ _SENTENCES = {
     Verdict.APEX_ROSE: "apex rose: a rebound went higher than the one before",
     Verdict.ENERGY_GREW: "energy grew: the cube had more energy in the air than at the launch",
     Verdict.SANK: "sank or tunnelled: the whole cube was below the ground at the end, deeper than a bounce",
-    Verdict.UNDECIDED: "undecided: the budget of computed steps was spent before the end",
+    Verdict.UNDECIDED: "undecided: the budget of steps or force evaluations was spent before the end",
     Verdict.STALLED: "stalled: the steps are too short for double precision to move the cube",
     Verdict.BLEW_UP: f"blew up: the airborne energy passed {BLOW_UP:g} times the start's",
     Verdict.LEFT_NUMERIC_RANGE: "left the numeric range: a number grew past what double precision holds",

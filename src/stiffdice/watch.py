@@ -25,14 +25,15 @@ from stiffdice.state import Physics
 # [m/s] and the speed one step before; flight: how many steps in a row have been in the air; lifted: 1 if in this step
 # a flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
 # change any more (`phases.py`); touched: 1 if a node was on the ground at any step so far. Of the last bounce:
-# speed_in, speed_out [m/s] at zero clearance, NaN if unknown.
+# speed_in, speed_out [m/s] at zero clearance, NaN if unknown. Of a scheme that takes its own steps
+# (`schemes/own_steps.py`): pending [s], what is left of the step that was begun; work, done so far.
 SIGHT = np.dtype(
     [
         (name, np.float64)
         for name in (
             *("step_size", "steps", "late", "lag", "pull", "sag", "room", "hop_height"),
             *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted", "still", "held", "touched"),
-            *("speed_in", "speed_out", "bounces", "touchdown_phase"),
+            *("speed_in", "speed_out", "bounces", "touchdown_phase", "pending", "work"),
         )
     ]
 )
@@ -76,6 +77,8 @@ def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: 
     sight.speed_out = math.nan
     sight.bounces = 0.0
     sight.touchdown_phase = math.nan
+    sight.pending = 0.0
+    sight.work = 0.0
 
 
 @njit

@@ -65,6 +65,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
     )
     run.add_argument(
+        "--budget",
+        metavar="N",
+        help="most force evaluations of a run by event, exact or scipy, which take steps of their own, and most steps "
+        "of any other; a run that needs more is stored with the verdict undecided (default: 1e7; all steps)",
+    )
+    run.add_argument(
         "--ledger",
         action="store_true",
         help="book where the energy goes, for every bounce and for the run (takes some times as long)",
@@ -104,6 +110,7 @@ def _run(options: argparse.Namespace) -> None:
     tolerance = (
         schemes.TOLERANCE if options.tolerance is None else numbers.number("--tolerance", options.tolerance, "1")
     )
+    budget = None if options.budget is None else numbers.whole("--budget", options.budget)
     method = scheme if options.simulator == simulators.OURS else ""
     model, _ = requirement.chosen(options.model, [scene], scene.duration / steps)
     simulators.check_fit(options.simulator, scheme, scene, model)
@@ -118,11 +125,12 @@ def _run(options: argparse.Namespace) -> None:
             steps=steps,
             tolerance=tolerance,
             every=every,
+            budget=budget,
             progress=progress.show,
         )
     dataset = run_dataset(run)
     if options.ledger:
-        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps)
+        books = ledger.keep(scene, model=run.model, scheme=scheme, steps=steps, budget=int(run.steps_done[0]))
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
     for line in filter(None, [*scene.derived, note]):

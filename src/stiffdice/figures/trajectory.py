@@ -39,9 +39,7 @@ def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
         look = style.PRESET_LOOKS[preset]
         full = run.get("mechanical_energy", run.energy_paper + run.elastic_energy)
         panel.axhline(float(full[0]), color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
-        panel.plot(
-            run.time, full, color=style.INK, linewidth=2.4, label="mechanical: with the springs"
-        )
+        panel.plot(run.time, full, color=style.INK, linewidth=2.4, label="mechanical: with the springs")
         panel.plot(run.time, run.energy_paper, color=look["color"], label="paper's: kinetic + m g z", zorder=3)
         panel.set_title(look["label"])
         panel.set_ylabel("energy [J]")

@@ -29,7 +29,7 @@ import numpy as np
 import scipy
 from scipy.integrate import ode, odeint, solve_ivp
 
-from stiffdice import checks, models
+from stiffdice import checks, models, schemes
 from stiffdice.compiled import njit
 from stiffdice.contact import LAWS
 from stiffdice.energy import energies
@@ -180,26 +180,46 @@ def versions() -> str:
     return f"scipy {scipy.__version__}"
 
 
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> Lsoda:
-    """Return a run of LSODA from a launch, shape (1,), told every h [s]; tolerance [1]: SciPy's rtol."""
-    return Lsoda(scene, model, launch, h, tolerance)
+def start(scene: Scene, model: str, launch: States, h: float, tolerance: float, most: int = schemes.BUDGET) -> Lsoda:
+    """Return a run of LSODA from a launch, shape (1,), told every h [s]; tolerance [1]: SciPy's rtol.
+
+    most: force evaluations, after which it ends.
+    """
+    return Lsoda(scene, model, launch, h, tolerance, most)
 
 
 class Lsoda:
     """One run, standing where `advance` left it."""
 
-    def __init__(self, scene: Scene, model: str, launch: States, h: float, tolerance: float) -> None:
+    def __init__(self, scene: Scene, model: str, launch: States, h: float, tolerance: float, most: int) -> None:
         """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        self._model, self._h, self._tolerance = model, h, tolerance
-        self._sizes, self._given, self._y = _sizes(scene, model), _given(scene, model, launch), _start(launch, model)
+        self._model, self._h, self._tolerance, self._left = model, h, tolerance, most
+        self._sizes, self._y = _sizes(scene, model), _start(launch, model)
+        self._slope, slopes, numbers, room = _given(scene, model, launch)
+        self._given: Given = self._counted, slopes, numbers, room
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
         times: Array = self._h * every * np.arange(len(states) + 1.0)
-        solution, evaluations = _solved(_lsoda, self._y, times, self._tolerance, self._sizes, self._given)
+        before = self._left
+        try:
+            solution, evaluations = _solved(_lsoda, self._y, times, self._tolerance, self._sizes, self._given)
+        except _SpentError:
+            solution, evaluations = np.full((len(times), len(self._y)), np.nan), before
         _states(MODELS[self._model], self._given[2], solution[1:], states)
         self._y = solution[-1]
         return evaluations
+
+    def _counted(self, t: float, y: Array, numbers: Array, room: States) -> Array:
+        """Return dy/dt. Between two of these Python sees a signal, which within odeint it does not."""
+        self._left -= 1
+        if self._left < 0:
+            raise _SpentError
+        return self._slope(t, y, numbers, room)
+
+
+class _SpentError(Exception):
+    """All evaluations that were allowed are done."""
 
 
 def _solved(

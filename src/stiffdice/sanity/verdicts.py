@@ -17,6 +17,9 @@ from stiffdice.verdict import SEVERITY, Verdict
 # How a run may have ended that its measures do not show.
 ENDINGS = (Verdict.UNRESOLVED, Verdict.SANK, Verdict.STALLED, Verdict.UNDECIDED)
 
+# Of a run that ended early: that a budget was spent, or what is graver.
+_EARLY = SEVERITY[SEVERITY.index(Verdict.UNDECIDED) :]
+
 _GRAVITY = np.array([SEVERITY.index(verdict) for verdict in Verdict])
 
 
@@ -105,7 +108,7 @@ def early(
     decided: whether all criteria that may end a run were decided.
     """
     done, stored = np.asarray(steps_done), np.asarray(verdict)
-    reasons = np.isin(stored, [Verdict.LEFT_NUMERIC_RANGE, Verdict.UNDECIDED]) | np.asarray(decided, bool)
+    reasons = np.isin(stored, _EARLY) | np.asarray(decided, bool)
     found = outside("verdict", stored, (done < steps) | (stored != Verdict.UNDECIDED), "undecided only before the end")
     why = "all of the run's steps, or a reason to end earlier"
     return found + outside("steps_done", done, (done == steps) | reasons, why)

@@ -20,6 +20,7 @@ from stiffdice.schemes import (
     exact,
     forward_euler,
     implicit_euler,
+    own_steps,
     rk4,
     symplectic_euler,
     velocity_verlet,
@@ -49,23 +50,47 @@ def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:
 step = _chosen("step")
 
 
-def _one_step(module: Any) -> Any:
-    """Return what stands for the `stretch` of a scheme that has none."""
+def _whole(module: Any) -> Any:
+    """Return what takes a step of a scheme that takes it whole."""
     step = module.step
 
     @njit
-    def one(
-        model: Any, law: Any, physics: Any, state: Any, sight: Any, high: Any, low: Any, most: Any, tolerance: Any
-    ) -> tuple[int, int, int]:
-        return 1, 1, step(model, law, physics, state, sight.step_size, tolerance)
+    def one(model: Any, law: Any, physics: Any, state: Any, sight: Any, tolerance: Any) -> tuple[int, int]:
+        return 1, step(model, law, physics, state, sight.step_size, tolerance)
 
     return one
 
 
+# By the tag: what takes one step, whole or part by part.
+_ONE = {
+    type(module.TAG): own_steps.resumed(module.part) if hasattr(module, "part") else _whole(module)
+    for module in _MODULES.values()
+}
+
+# (scheme, model, law, physics, state, sight, tolerance) -> steps done, 0 or 1, and force evaluations: advance
+# `state` by one step, or by a part of it (`own_steps.py`).
+one = by_tag(_ONE)
+
+
+def _stretch_of_one(module: Any) -> Any:
+    """Return what stands for the `stretch` of a scheme that has none."""
+    one = _ONE[type(module.TAG)]
+
+    @njit
+    def stretch(
+        model: Any, law: Any, physics: Any, state: Any, sight: Any, high: Any, low: Any, most: Any, tolerance: Any
+    ) -> tuple[int, int, int]:
+        steps, evaluations = one(model, law, physics, state, sight, tolerance)
+        return steps, steps, evaluations
+
+    return stretch
+
+
 # (scheme, model, law, physics, state, sight, high, low, most, tolerance) -> steps, those computed, force evaluations:
-# advance `state` by steps that need not be looked at and one that does, at most `most`, as `swift.py` says.
+# advance `state` by steps that need not be looked at and one that does, at most `most`, as `swift.py` says. None is
+# taken where the one that does is not over (`own_steps.py`).
 stretch = by_tag(
-    {type(module.TAG): getattr(module, "stretch", None) or _one_step(module) for module in _MODULES.values()}
+    {type(module.TAG): getattr(module, "stretch", None) or _stretch_of_one(module) for module in _MODULES.values()}
 )
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
@@ -85,6 +110,19 @@ FINEST, COARSEST = 1e-13, 0.1
 
 # Schemes that take steps of their own between two states: what happens in one of ours, they do not tell.
 OWN_STEPS = frozenset(name for name, module in _MODULES.items() if getattr(module, "OWN_STEPS", False))
+
+# Schemes of which a step may take any amount of work.
+IN_PARTS = frozenset(name for name, module in _MODULES.items() if hasattr(module, "part"))
+
+
+# The most force evaluations of a run whose number of steps does not bound them, unless told otherwise.
+BUDGET = own_steps.BUDGET
+
+
+def budget_of(scheme: str, steps: int) -> int:
+    """Return the most work of a run, unless told otherwise: all its steps, or BUDGET."""
+    return BUDGET if scheme in IN_PARTS else steps
+
 
 # By how many steps a scheme's velocity is behind its place: in free flight the path's slope is u + LAG·(u − u_before).
 LAGS: dict[str, float] = {name: module.LAG for name, module in _MODULES.items()}

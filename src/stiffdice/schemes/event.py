@@ -39,6 +39,7 @@ from stiffdice.regime import (
     vanishing,
 )
 from stiffdice.schemes import closed
+from stiffdice.schemes.own_steps import PART
 from stiffdice.state import Physics
 from stiffdice.touchdown import free_time
 
@@ -59,6 +60,9 @@ FORMULA = (
 LAG = 0.0
 
 OWN_STEPS = True
+
+# So many advances to a touch-down take about as long as an evaluation of the forces.
+_ADVANCES = 4
 
 # An explicit step is not stable for longer than about this over the fastest friction or damping.
 _STIFF = 4.0
@@ -108,19 +112,38 @@ _WORK = np.dtype(
 @njit
 def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by h [s] and return how often the forces were evaluated."""
+    left, evaluations = h, 0
+    while left > 0.0:
+        left, count, _ = part(model, law, physics, state, left, tolerance, PART)
+        evaluations += count
+    return evaluations
+
+
+@njit
+def part(
+    model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
+) -> tuple[float, int, int]:
+    """Advance `state` by h [s], or by less where that is more work; return what is left [s], evaluations, and the work.
+
+    most: about how much work at most, in evaluations; finding touch-downs is work, too.
+    """
     # bool() keeps them from being taken for constants, for each of which all would be compiled again.
     turning, dragging = bool(models.turns(model)), bool(physics.damping > 0.0 and drags(law))
-    left, evaluations = h, 0
-    while left > 0.0 and math.isfinite(state.position[2]):
+    left, evaluations, work = h, 0, 0
+    while left > 0.0 and work < most:
+        if not math.isfinite(state.position[2]):
+            return 0.0, evaluations, work
         if not dragging:
-            free = free_time(model, physics, state, left)
+            free, advances = free_time(model, physics, state, left)
             flight(model, physics, state, free, 1)
             left -= free
+            work += 1 + advances // _ADVANCES
         if left > 0.0:
-            spent, count = _contact(turning, dragging, physics, state, left, tolerance)
+            spent, count = _contact(turning, dragging, physics, state, left, tolerance, max(1, most - work))
             left -= spent
             evaluations += count
-    return evaluations
+            work += count
+    return left, evaluations, work
 
 
 @njit
@@ -131,17 +154,20 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> No
 
 @njit(cache=True)
 def _contact(
-    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float
+    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int
 ) -> tuple[float, int]:
-    """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations."""
+    """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations.
+
+    effort: evaluations after which to stop between two steps.
+    """
     # Kept here while it is used: a record does not keep its array alive.
     room = np.zeros(1, _WORK)
-    return _go_through(turning, dragging, physics, state, most, tolerance, room)
+    return _go_through(turning, dragging, physics, state, most, tolerance, effort, room)
 
 
 @njit
 def _go_through(
-    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, room: Any
+    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int, room: Any
 ) -> tuple[float, int]:
     work = room[0]
     for node in range(NODES):
@@ -153,7 +179,7 @@ def _go_through(
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
     _look_from(turning, dragging, physics, work)
     time, h, evaluations, idle, forced = 0.0, 0.0, 1, 0, 0
-    while time < most and (dragging or not force_free(work.bits)):
+    while time < most and evaluations < effort and (dragging or not force_free(work.bits)):
         hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
         if h == 0.0:
             h = _first(physics, work, tolerance)

@@ -30,6 +30,7 @@ from stiffdice.compiled import njit
 from stiffdice.contact import height_of, reaches, speed_of
 from stiffdice.oscillator import Oscillator, after, first_zero, passing
 from stiffdice.scene import Scene
+from stiffdice.schemes.own_steps import PART
 from stiffdice.slip import along, evenly
 from stiffdice.state import TURNING, Array, Physics
 
@@ -45,9 +46,6 @@ FORMULA = "parabolas and damped oscillations in closed form, from one event to t
 
 # The velocity is that at the stored place.
 LAG = 0.0
-
-# A step that has more pieces, minutes of ever smaller bounces, ends as not-a-number.
-MOST = 5_000_000
 
 # Nodes whose levels differ by less, in units of the farthest node's distance, are level: rounding differs by as much.
 _LEVEL = 2.0**-48
@@ -130,7 +128,22 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     """Advance `state` by h [s], of any length, and return how many pieces that took.
 
     The force is evaluated once for each piece; cycles taken at once are part of one. Not for a model that turns the
-    cube, nor for friction on a slope (`unfit`). Not-a-number where there are more than MOST pieces.
+    cube, nor for friction on a slope (`unfit`).
+    """
+    left, pieces = h, 0
+    while left > 0.0:
+        left, count, _ = part(model, law, physics, state, left, tolerance, PART)
+        pieces += count
+    return pieces
+
+
+@njit
+def part(
+    model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
+) -> tuple[float, int, int]:
+    """Advance `state` by h [s], or by less in as many pieces as are allowed; return what is left [s], pieces, and work.
+
+    most: pieces at most.
     """
     fall = physics.weight / physics.mass
     pull = fall * physics.nz
@@ -138,7 +151,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     drags = physics.damping > 0.0 and reaches(law, 1.0)
     if not drags and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
         _fly(state, fall, h)
-        return 1
+        return 0.0, 1, 1
     tx = state.velocity[0] - u * physics.nx
     ty = state.velocity[1] - u * physics.ny
     tz = state.velocity[2] - u * physics.nz
@@ -148,8 +161,9 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     before = height + lowest
     # Laid on the ground, to round-off of the place.
     start = 0.0 if u == 0.0 and abs(before) <= _LAID * (abs(height) + physics.reach) else before
-    c, u, left, way, pieces = _advance(_ground_of(physics, drags, pull, levels), table, start, u, slip, h)
-    share, time = (left / slip, way / slip) if slip > 0.0 else (1.0, h)
+    end, pieces = _advance(_ground_of(physics, drags, pull, levels), table, start, u, slip, h, most)
+    c, u, h = end.c, end.u, h - max(0.0, end.left)
+    share, time = (end.slip / slip, end.way / slip) if slip > 0.0 else (1.0, h)
     # Gravity along the ground: none where there is friction.
     sx, sy, sz = pull * physics.nx, pull * physics.ny, pull * physics.nz - fall
     state.position[0] += (time * tx + h * (h * sx / 2)) + (c - before) * physics.nx
@@ -164,7 +178,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     state.velocity[0] = (share * tx + h * sx) + u * physics.nx
     state.velocity[1] = (share * ty + h * sy) + u * physics.ny
     state.velocity[2] = (share * tz + h * sz) + u * physics.nz
-    return pieces
+    return end.left if math.isfinite(end.c) else 0.0, pieces, pieces
 
 
 @njit
@@ -253,18 +267,16 @@ def _pressing(ground: _Ground, table: Array, c: float, u: float) -> int:
 
 @njit
 def _advance(
-    ground: _Ground, table: Array, c: float, u: float, slip: float, h: float
-) -> tuple[float, float, float, float, int]:
-    """Go on for h [s] from a clearance c [m] of the lowest level and a speed u [m/s] along the normal.
+    ground: _Ground, table: Array, c: float, u: float, slip: float, h: float, most: int
+) -> tuple[_Course, int]:
+    """Go on for h [s], or so many pieces, from a clearance c [m] of the lowest level and a speed u [m/s] upwards.
 
-    slip [m/s]: along the ground; zero where there is no friction. Return c, u, slip, the way slipped [m] and pieces.
+    slip [m/s]: along the ground; zero where there is no friction. Return where that ends, and pieces.
     """
     now = _Course(c, u, _pressing(ground, table, c, u), slip, 0.0, h, 0.0, -1.0, _NONE)
     pieces = 0
-    while now.left > 0.0:
+    while now.left > 0.0 and pieces < most:
         pieces += 1
-        if pieces > MOST:
-            return math.nan, math.nan, math.nan, math.nan, pieces
         if now.u == 0.0:
             now = _wait(ground, table, now)
         free = now.j == 0 and now.c >= 0.0 and not ground.drags
@@ -273,7 +285,7 @@ def _advance(
             now = _land(ground, now, t)
         elif now.left > 0.0:
             now = _move(ground, table, now)
-    return now.c, now.u, now.slip, now.way, pieces
+    return now, pieces
 
 
 @njit
