@@ -67,10 +67,10 @@ def test_zero_lies_below_all_numbers(data):
 
 def test_theory_is_drawn_where_it_is(data, figure):
     lines = {line.get_label(): np.asarray(line.get_xydata()) for line in figure.axes[5].get_lines()}
-    np.testing.assert_allclose(lines["bounce"][:, 0], data["mass"].limit_steps.values[0, 1])
-    np.testing.assert_allclose(lines["bounce"][:, 1], [-2, 0, 6])
+    np.testing.assert_allclose(lines["contact"][:, 0], data["mass"].limit_steps.values[0, 1])
+    np.testing.assert_allclose(lines["contact"][:, 1], [-2, 0, 6])
     ungated = [line.get_label() for line in figure.axes[0].get_lines()]
-    assert {"bounce", "drag"} <= set(ungated)
+    assert {"contact", "drag"} <= set(ungated)
 
 
 def test_the_legend_names_what_occurs_and_nothing_else(data, figure):
