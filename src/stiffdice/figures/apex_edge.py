@@ -26,22 +26,22 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         _panel(panel, found)
     panels[0].set_ylabel("ωh of the last fail [1]")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    ground = json.loads(columns[0].attrs["scene"])["ground"]
-    style.add_note(
-        figure,
-        f"sliding, symplectic Euler, {columns[0].attrs['members']} members; "
-        f"S = {captions.readable(ground['stiffness'])} kg/s², D = {captions.readable(ground['damping'])} kg/s",
-    )
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
 
 
 def _panel(panel: Any, found: xr.Dataset) -> None:
-    panel.set_title(style.LAW_NAMES[meanings_of(found.contact)[int(found.contact)]])
+    ground = json.loads(found.attrs["scene"])["ground"]
+    panel.set_title(
+        f"{style.LAW_NAMES[meanings_of(found.contact)[int(found.contact)]]}, "
+        f"S = {captions.readable(ground['stiffness'])} kg/s², D = {captions.readable(ground['damping'])} kg/s"
+    )
     heights = found.hop_height.values
     for k, seconds in enumerate(found.duration.values):
         color, mark = _LOOKS[min(k, len(_LOOKS) - 1)]
-        panel.plot(heights, found.last_fail.values[k], color=color, marker=mark, markersize=4, label=f"{seconds:g} s")
+        panel.plot(
+            heights, found.last_fail.values[k], color=color, marker=mark, markersize=4, label=f"runs of {seconds:g} s"
+        )
     panel.plot(
         heights, found.predicted, color=style.INK, linestyle="--", linewidth=1.0, label="theory: largest gain × R(H)"
     )

@@ -29,7 +29,7 @@ _NAMES = {
 }
 _LIMIT_LOOKS: dict[str, dict[str, Any]] = {
     "contact": {"linestyle": "-", "label": "theory: fastest contact, ωh = 2(√(1 + ζ²) − ζ)"},
-    "drag": {"linestyle": "--", "label": "theory: drag of a falling cube (ungated), 8 D h/m = 2"},
+    "drag": {"linestyle": "--", "label": "theory: drag in mid-air (ungated), 8 D h/m = 2, or 12 if it turns"},
     "turn": {"linestyle": "-.", "label": "theory: half a turn in a step"},
     "stall": {"linestyle": ":", "label": "theory: a step at launch is half a unit in the last place of z"},
 }

@@ -111,8 +111,9 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
 def _legend(columns: list[xr.Dataset]) -> list[Any]:
     handles: list[Any] = []
     tolerances = {name: float(found.tolerance) for frontier in columns for name, found in _by_criterion(frontier)}
+    hop_height = columns[0].attrs.get("hop_height")
     for criterion, tolerance in tolerances.items():
-        look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance)
+        look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance, hop_height)
         common: Any = {"linestyle": "none", "color": look["color"]}
         open_mark: Any = {"marker": look["first"], "markersize": 5.5, "markerfacecolor": "none"}
         handles.append(Line2D([], [], label=f"first pass: {words}", **open_mark, **common))

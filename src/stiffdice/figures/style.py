@@ -58,9 +58,10 @@ _CRITERION_WORDS = {
 }
 
 
-def criterion_words(criterion: str, tolerance: float) -> str:
-    """Return what a criterion asks, in a few words."""
-    return _CRITERION_WORDS[criterion].format(1 + tolerance, tolerance)
+def criterion_words(criterion: str, tolerance: float, hop_height: float | None = None) -> str:
+    """Return what a criterion asks, in a few words; with the height [m] from which rebounds count, if given."""
+    words = _CRITERION_WORDS[criterion].format(1 + tolerance, tolerance)
+    return words if criterion != "apex" or hop_height is None else f"{words}, from {hop_height:g} m on"
 
 
 _SETTINGS: Any = {
