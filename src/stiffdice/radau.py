@@ -76,8 +76,9 @@ def step(
     for stage in range(1, STAGES):
         about[stage], by_speed[stage], by_place[stage] = about[0], by_speed[0], by_place[0]
     _follow(turning, physics, start, h, change, rates, scale)
-    correction, iteration, fresh, found = 0.0, 0, True, False
-    while not found and iteration < _ITERATIONS and math.isfinite(correction):
+    correction, last, iteration, fresh, found = 0.0, 0.0, 0, True, False
+    # One that wanders off may find other stages, as smooth and as wrong.
+    while not found and iteration < _ITERATIONS and (iteration < 3 or correction < last):
         for stage in range(STAGES):
             _reach(start, change[stage], end)
             derivative(turning, physics, nodes, regime, end, rates[stage])
@@ -95,7 +96,7 @@ def step(
             off = max(off, retouch(turning, physics, nodes, regime, end, about[stage]) / scale[3])
         iteration += 1
         left = correction * min(1.0, correction / last) if last > 0.0 else correction
-        found = max(left, off) <= _ENOUGH
+        found = left <= _ENOUGH and off <= _ENOUGH
         fresh = iteration == 1 or off > _ENOUGH or correction > _SLOW * last
     _reach(start, change[STAGES - 1], end)
     return _error(change, unknowns, scale) if found else math.inf, STAGES * iteration

@@ -69,6 +69,9 @@ _FIRST = 5.0
 # Where friction holds a node, its slip is of the order of the cutoff, and must be known to a part of that.
 _HELD = 0.1
 
+# By what a step may exceed the one before.
+_GROWTH = 5.0
+
 # A step is accepted whatever its error once it is shorter than this part of the contact's 1/ω or of all there is to go.
 _SHORTEST = 1e-13
 
@@ -151,7 +154,7 @@ def _go_through(
     vanishing(physics, work.here, work.small)
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
     _look_from(turning, dragging, physics, work)
-    time, h, evaluations, idle, forced = 0.0, 0.0, 1, 0, 0
+    time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
     while time < most and (dragging or not force_free(work.bits)):
         hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
         if h == 0.0:
@@ -160,11 +163,12 @@ def _go_through(
         _tolerate(physics, work, tolerance, pace)
         error, order, count = _attempt(turning, physics, work, pace)
         evaluations += count + 1
-        change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else 5.0
+        change = min(growth, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else growth
         if not error <= 1.0 and pace * slowest > _SHORTEST:
             h = pace * min(change, 0.9)
+            growth = 1.0 if error == math.inf else _GROWTH  # where no stages are found, it is not the error that says
             continue
-        forced = 0 if error <= 1.0 else forced + 1
+        forced, growth = 0 if error <= 1.0 else forced + 1, _GROWTH
         if forced > _FORCED or not math.isfinite(work.small[1]):
             work.here[:] = math.nan
             break
@@ -326,21 +330,26 @@ def _first_zero(work: Any, h: float) -> float:
 def _locate(
     turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float
 ) -> tuple[float, float, int]:
-    """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, the error, evaluations."""
-    evaluations, change, error = 0, math.inf, 0.0
+    """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, the error, evaluations.
+
+    The error is infinite where none was found.
+    """
+    evaluations, change, error, hardest = 0, math.inf, 0.0, max(work.hard[0], work.hard[1])
     for _ in range(_CORRECTIONS):
-        if abs(change) * max(work.hard[0], work.hard[1]) < _NEAR:
+        if abs(change) * hardest < _NEAR:
             _shift(turning, physics, work, change)
             evaluations += 4
         else:
             error, _, count = _attempt(turning, physics, work, when)
             evaluations += count + 1
+        if not error <= 1.0:
+            break
         _look_to(turning, dragging, physics, work)
         better = min(most, max(0.0, when + _correction(work, when)))
         if better == when:
-            break
+            return when, error, evaluations
         change, when = better - when, better
-    return when, error, evaluations
+    return when, error if abs(change) * hardest < _NEAR else math.inf, evaluations
 
 
 @njit
