@@ -87,7 +87,7 @@ HELD = (0.11094238, 0.61472022, 0.5124655)
 def test_a_corner_held_by_friction_agrees_with_a_stiff_integrator():
     scene = throw(1e8, spin=HELD)
     own, _ = places(scene, 1e-11)
-    assert apart(own, solved(scene, "LSODA", 1e-11)) < 5e-8
+    assert apart(own, solved(scene, "LSODA", 1e-12)) < 2e-9
 
 
 def rough_throw(stiffness):

@@ -66,8 +66,9 @@ _STIFF = 4.0
 # The first step of a contact: about what turns out to be right, as part of its 1/ω, over the tolerance's eighth root.
 _FIRST = 5.0
 
-# Where friction holds a node, its slip is of the order of the cutoff, and must be known to a part of that.
-_HELD = 0.1
+# Where friction is so many times as fast as the contact it holds a node, or is about to: the slip is of the order of
+# the cutoff then, and must be known to a part of that.
+_HOLDING, _HELD = 1e4, 0.1
 
 # By what a step may exceed the one before.
 _GROWTH = 5.0
@@ -237,7 +238,7 @@ def _tolerate(physics: Physics, work: Any, tolerance: float, h: float) -> None:
     else:
         length, pace = physics.reach, max(speed, math.sqrt(physics.gravity * physics.reach))
     length, pace = tolerance * length, tolerance * pace
-    if hard[1] * h > _STIFF:
+    if hard[1] > _HOLDING * hard[0]:
         pace = min(pace, _HELD * physics.cutoff)
     # What round-off does to a step is no error of it.
     length = max(length, work.small[0])
