@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
-from stiffdice.regime import NODES, SIZE, derivative, retouch, slips, slopes, straighten
+from stiffdice.regime import NODES, SIZE, derivative
 from stiffdice.state import Physics
+from stiffdice.tangent import retouch, slips, slopes, straighten
 
 STAGES = 5
 ORDER = 7  # of the error estimate
