@@ -1,4 +1,4 @@
-"""A regime's forces are the contact law's; its slopes are their slopes."""
+"""A regime's forces are the contact law's, and its switches change as they say."""
 
 from __future__ import annotations
 
@@ -33,11 +33,6 @@ def derivative(turning, physics, nodes, bits, motion, rate):
 def begin(turning, dragging, physics, nodes, motion, bits, small):
     regime.vanishing(physics, motion, small)
     regime.begin(turning, dragging, physics, nodes, motion, bits, small)
-
-
-@njit(cache=True)
-def slopes(turning, physics, nodes, bits, motion, by_speed, by_place):
-    regime.slopes(turning, physics, nodes, bits, motion, by_speed, by_place)
 
 
 @njit(cache=True)
@@ -98,33 +93,6 @@ def test_the_quaternion_turns_at_the_spin():
     spin = parts[4][6:9] / parts[1].inertia
     rate = rate_of(*parts)
     np.testing.assert_allclose(rate[9:13], [0, *(spin / 2)], atol=1e-15)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_slopes_are_those_of_the_rates(law):
-    """Central differences: a change of place and rotation moves the nodes, at the same u and L."""
-    for _ in range(20):
-        scene = landing(law)
-        turning, physics, nodes, bits, motion = begun(scene)
-        by_speed, by_place = np.zeros((6, 6)), np.zeros((6, 6))
-        slopes(turning, physics, nodes, bits, motion, by_speed, by_place)
-        for column in range(6):
-            d = 1e-6
-            change = np.zeros(regime.SIZE)
-            change[3 + column] = d
-            difference = rate_of(turning, physics, nodes, bits, motion + change) - rate_of(
-                turning, physics, nodes, bits, motion - change
-            )
-            np.testing.assert_allclose(by_speed[:, column], difference[3:9] / (2 * d), rtol=2e-5, atol=2e-5)
-            change = np.zeros(regime.SIZE)
-            if column < 3:
-                change[column] = d
-            else:
-                change[10 + column - 3] = d / 2 / physics.inertia
-            difference = rate_of(turning, physics, nodes, bits, motion + change) - rate_of(
-                turning, physics, nodes, bits, motion - change
-            )
-            np.testing.assert_allclose(by_place[:, column], difference[3:9] / (2 * d), rtol=2e-5, atol=2e-3)
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -64,7 +64,7 @@ def _turned(motion: Any, sense: float, a: float, b: float, c: float) -> tuple[fl
 
 
 @njit
-def _node(
+def node_of(
     turning: bool, physics: Physics, nodes: Any, motion: Any, k: int
 ) -> tuple[float, float, float, float, float, float]:
     """Return place relative to the centre [m] and velocity [m/s] of node k."""
@@ -94,7 +94,7 @@ def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion:
     for k in range(NODES):
         if regime[k] & PUSHED == 0:
             continue
-        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
         push = -physics.damping * speed
         if regime[k] & BELOW:
@@ -217,7 +217,7 @@ def begin(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: A
     """Set the regime that a motion is in; small: from `vanishing`."""
     height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
     for k in range(NODES):
-        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
         clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
         # A node that is about at the ground is on the side to which it goes.
@@ -242,7 +242,7 @@ def cross(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: A
     if switch % 2:
         regime[k] ^= PUSHED
         return
-    _, _, _, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+    _, _, _, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
     speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
     regime[k] = _answers(dragging, physics, regime[k] & BELOW == 0, 0.0, speed)
 
@@ -299,7 +299,7 @@ def hardness(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: A
     for k in range(NODES):
         if regime[k] == 0:
             continue
-        rx, ry, rz, vx, vy, vz = _node(turning, physics, nodes, motion, k)
+        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
         level = physics.nx * rx + physics.ny * ry + physics.nz * rz
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
         pliancy = 1.0 / physics.mass
@@ -320,102 +320,3 @@ def hardness(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: A
     hard[2] = speed_most + frequency * depth_most
     if frequency > 0.0:
         hard[2] += physics.gravity / frequency
-
-
-@njit
-def slopes(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, by_speed: Any, by_place: Any) -> None:
-    """Set the slopes of u' and L', shape (6, 6) each: in u and L, and in place and I times rotation.
-
-    A node's force f n − μ f s/(|s| + ε), with f = S d − D u and s the velocity along the ground, changes with the
-    node's velocity v and place x by
-    −(n − μ s/(|s| + ε)) (D n·δv + S n·δx) − μ f/(|s| + ε) (δs − s (s·δs)/(|s| (|s| + ε))).
-    A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r).
-    """
-    for i in range(6):
-        for j in range(6):
-            by_speed[i, j] = by_place[i, j] = 0.0
-    by_velocity, by_shift, by_turn, lever = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3))
-    normal, slip, force, arm = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
-    normal[0], normal[1], normal[2] = physics.nx, physics.ny, physics.nz
-    for k in range(NODES):
-        if regime[k] & PUSHED == 0:
-            continue
-        arm[0], arm[1], arm[2], slip[0], slip[1], slip[2] = _node(turning, physics, nodes, motion, k)
-        speed = _dot(normal, slip)
-        spring = physics.stiffness if regime[k] & BELOW else 0.0
-        push = -physics.damping * speed - spring * (height + _dot(normal, arm))
-        for i in range(3):
-            slip[i] -= speed * normal[i]
-        length = math.sqrt(_dot(slip, slip))
-        long = length + physics.cutoff
-        grip = physics.friction * push / long
-        bend = grip / (length * long) if length > 0.0 else 0.0
-        for i in range(3):
-            force[i] = push * normal[i] - grip * slip[i]
-            for j in range(3):
-                pressed = (normal[i] - physics.friction * slip[i] / long) * normal[j]
-                by_velocity[i, j] = grip * normal[i] * normal[j] + bend * slip[i] * slip[j] - physics.damping * pressed
-                by_shift[i, j] = by_turn[i, j] = -spring * pressed
-            by_velocity[i, i] -= grip
-        _add(by_velocity, 1.0 / physics.mass, by_speed, 0, 0)
-        _add(by_shift, 1.0 / physics.mass, by_place, 0, 0)
-        if turning:
-            lever[0, 1], lever[0, 2], lever[1, 2] = arm[2], -arm[1], arm[0]
-            lever[1, 0], lever[2, 0], lever[2, 1] = -arm[2], arm[1], -arm[0]
-            _whirled(physics, motion, by_velocity, by_turn)
-            _turned_slopes(physics, lever, by_velocity, by_velocity, by_speed)
-            _turned_slopes(physics, lever, by_shift, by_turn, by_place)
-            _levered(physics, arm, force, by_place)
-
-
-@njit
-def _dot(a: Any, b: Any) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@njit
-def _add(block: Any, factor: float, slope: Any, row: int, column: int) -> None:
-    for i in range(3):
-        for j in range(3):
-            slope[row + i, column + j] += factor * block[i, j]
-
-
-@njit
-def _whirled(physics: Physics, motion: Any, by_velocity: Any, by_turn: Any) -> None:
-    """Add to a force's slope in a node's place what changes with it as the node's velocity: ω × δx."""
-    wx, wy, wz = motion[6] / physics.inertia, motion[7] / physics.inertia, motion[8] / physics.inertia
-    for i in range(3):
-        x, y, z = by_velocity[i, 0], by_velocity[i, 1], by_velocity[i, 2]
-        by_turn[i, 0] += y * wz - z * wy
-        by_turn[i, 1] += z * wx - x * wz
-        by_turn[i, 2] += x * wy - y * wx
-
-
-@njit
-def _levered(physics: Physics, arm: Any, force: Any, slope: Any) -> None:
-    """Add how the torque of a force changes with its arm: (δθ × r) × f = r (δθ·f) − δθ (r·f)."""
-    along = _dot(arm, force)
-    for i in range(3):
-        for j in range(3):
-            slope[3 + i, 3 + j] += arm[i] * force[j] / physics.inertia
-        slope[3 + i, 3 + i] -= along / physics.inertia
-
-
-@njit
-def _turned_slopes(physics: Physics, lever: Any, of_centre: Any, of_turning: Any, slope: Any) -> None:
-    """Add what slopes of the force on one node are to the body by its turning, and to its torque.
-
-    lever: the matrix of δθ × r, of which the transpose makes the torque r × f out of f.
-    """
-    moved = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            for p in range(3):
-                moved[i, j] += of_turning[i, p] * lever[p, j]
-    _add(moved, 1.0 / (physics.mass * physics.inertia), slope, 0, 3)
-    for i in range(3):
-        for j in range(3):
-            for p in range(3):
-                slope[3 + i, j] += lever[p, i] * of_centre[p, j]
-                slope[3 + i, 3 + j] += lever[p, i] * moved[p, j] / physics.inertia

@@ -3,8 +3,8 @@
 A flight is a parabola and a turn at constant spin; its touch-down is found to round-off (`touchdown.py`). From there on
 the motion obeys smooth equations until a node crosses the ground or the force on one reaches zero (`regime.py`). Each
 such event is located to round-off, and the integrator starts anew behind it, so that it keeps its order: it is Dormand
-and Prince's method of order 8 (`dormand_prince.py`), or where friction holds a node, whose motion is stiff then, an
-extrapolated linearly implicit Euler method (`extrapolation.py`). Steps scale with the contact's time, so that their
+and Prince's method of order 8 (`dormand_prince.py`), or where friction holds a node, whose motion is stiff then,
+Radau's of order 9 (`radau.py`). Steps scale with the contact's time, so that their
 number does not depend on the stiffness. The tolerance is of a step's error, relative to the motion of the contact: to
 its speed, and to that over its frequency as length.
 
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiffdice import dormand_prince, extrapolation, models
+from stiffdice import dormand_prince, models, radau
 from stiffdice.compiled import njit
 from stiffdice.regime import (
     NODES,
@@ -53,7 +53,7 @@ TAG = Event()
 # One step of h, as files tell it.
 FORMULA = (
     "exact flights; contacts by Dormand and Prince's method of order 8 from one event to the next, "
-    "extrapolated linearly implicit Euler where friction holds a node"
+    "Radau's implicit method of order 9 where friction holds a node"
 )
 
 # The velocity is that at the stored place.
@@ -70,8 +70,12 @@ _STIFF = 4.0
 # The first step of a contact: about what turns out to be right, as part of its 1/ω, over the tolerance's eighth root.
 _FIRST = 5.0
 
-# Where friction holds a node, its slip is of the order of the cutoff, and must be known to a part of that.
-_HELD = 0.1
+# Where friction is so many times as fast as the contact it holds a node, or is about to: the slip is of the order of
+# the cutoff then, and must be known to a part of that.
+_HOLDING, _HELD = 1e4, 0.1
+
+# By what a step may exceed the one before.
+_GROWTH = 5.0
 
 # A step is accepted whatever its error once it is shorter than this part of the contact's 1/ω or of all there is to go.
 _SHORTEST = 1e-13
@@ -88,7 +92,7 @@ _NEAR = 1e-3
 
 # What a contact is computed in, one record, which reaches compiled code as a bare pointer (see `state.STATE`). nodes,
 # bits: those of the regime. here, there: the motion at a step's start and end; stages: rates in between. scale: what
-# error is tolerated; nothing: zeros. sums, table: scratch of the integrators. hard: see `regime.hardness`. value,
+# error is tolerated; nothing: zeros. sums: scratch of the integrator. hard: see `regime.hardness`. value,
 # slope: of the switches at start and end; small: see `regime.vanishing`.
 _WORK = np.dtype(
     [
@@ -100,7 +104,6 @@ _WORK = np.dtype(
         ("stages", np.float64, (dormand_prince.STAGES + 1, SIZE)),
         ("nothing", np.float64, SIZE),
         ("sums", np.float64, (2, SIZE)),
-        ("table", np.float64, (extrapolation.COLUMNS, SIZE)),
         ("hard", np.float64, 3),
         ("value", np.float64, (2, SWITCHES)),
         ("slope", np.float64, (2, SWITCHES)),
@@ -178,23 +181,21 @@ def _go_through(
     vanishing(physics, work.here, work.small)
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
     _look_from(turning, dragging, physics, work)
-    time, h, evaluations, idle, forced = 0.0, 0.0, 1, 0, 0
+    time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
     while time < most and evaluations < effort and (dragging or not force_free(work.bits)):
         hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
         if h == 0.0:
             h = _first(physics, work, tolerance)
-        pace = min(h, most - time)
+        pace, slowest = min(h, most - time), max(work.hard[0], 1.0 / most)
         _tolerate(physics, work, tolerance, pace)
         error, order, count = _attempt(turning, physics, work, pace)
         evaluations += count + 1
-        change = min(5.0, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else 5.0
-        if not error <= 1.0:
-            if pace * max(work.hard[0], 1.0 / most) > _SHORTEST:
-                h = pace * min(change, 0.9)
-                continue
-            forced += 1
-        else:
-            forced = 0
+        change = min(growth, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else growth
+        if not error <= 1.0 and pace * slowest > _SHORTEST:
+            h = pace * min(change, 0.9)
+            growth = 1.0 if error == math.inf else _GROWTH  # where no stages are found, it is not the error that says
+            continue
+        forced, growth = 0 if error <= 1.0 else forced + 1, _GROWTH
         if forced > _FORCED or not math.isfinite(work.small[1]):
             work.here[:] = math.nan
             break
@@ -205,10 +206,13 @@ def _go_through(
             continue
         h = max(h, pace * change) if change > 1.0 else pace * change
         zero = _first_zero(work, pace)
-        met = zero <= pace and idle <= SWITCHES
-        if met:
-            pace, count = _locate(turning, dragging, physics, work, zero, pace)
+        if zero <= pace and idle <= SWITCHES:
+            end, error, count = _locate(turning, dragging, physics, work, zero, pace)
             evaluations += count
+            if not error <= 1.0 and end * slowest > _SHORTEST:
+                h = end / 2  # what a node does that is let go before the event is not seen from beyond it
+                continue
+            pace = end
             idle = idle + 1 if pace == 0.0 else 0
         time = most if pace == most - time else time + pace
         changed = _cross_zeros(turning, dragging, physics, work)
@@ -259,13 +263,12 @@ def _tolerate(physics: Physics, work: Any, tolerance: float, h: float) -> None:
         length, pace = hard[2] / hard[0], hard[2]
     else:
         length, pace = physics.reach, max(speed, math.sqrt(physics.gravity * physics.reach))
-    # What round-off does to a step is no error of it.
-    noise = 1.0
     length, pace = tolerance * length, tolerance * pace
-    if hard[1] * h > _STIFF:
-        noise, pace = extrapolation.NOISE, min(pace, _HELD * physics.cutoff)
-    length = max(length, noise * work.small[0])
-    pace = max(pace, noise * (work.small[0] * hard[0] + 2.0**-49 * speed))
+    if hard[1] > _HOLDING * hard[0]:
+        pace = min(pace, _HELD * physics.cutoff)
+    # What round-off does to a step is no error of it.
+    length = max(length, work.small[0])
+    pace = max(pace, work.small[0] * hard[0] + 2.0**-49 * speed)
     for axis in range(3):
         scale[axis], scale[3 + axis] = length, pace
     spin, turn = pace * physics.inertia / physics.reach, length / physics.reach
@@ -285,19 +288,10 @@ def _first(physics: Physics, work: Any, tolerance: float) -> float:
 def _attempt(turning: bool, physics: Physics, work: Any, h: float) -> tuple[float, int, int]:
     """Step by h [s]; return the error over what is tolerated, the order of its estimate, and evaluations."""
     if work.hard[1] * h > _STIFF:
-        error = extrapolation.step(
-            turning,
-            physics,
-            work.nodes,
-            work.bits,
-            work.here,
-            work.stages[0],
-            h,
-            work.table,
-            work.there,
-            work.scale,
+        error, count = radau.step(
+            turning, physics, work.nodes, work.bits, work.here, work.stages[0], h, work.there, work.scale
         )
-        return error, extrapolation.ORDER, extrapolation.EVALUATIONS
+        return error, radau.ORDER, count
     dormand_prince.step(turning, physics, work.nodes, work.bits, work.here, h, work.stages, work.there)
     return (
         dormand_prince.error(work.stages, work.scale, h, work.nothing, work.sums),
@@ -360,21 +354,29 @@ def _first_zero(work: Any, h: float) -> float:
 
 
 @njit
-def _locate(turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float) -> tuple[float, int]:
-    """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, and evaluations."""
-    evaluations, change = 0, math.inf
+def _locate(
+    turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float
+) -> tuple[float, float, int]:
+    """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, the error, evaluations.
+
+    The error is infinite where none was found.
+    """
+    evaluations, change, error, hardest = 0, math.inf, 0.0, max(work.hard[0], work.hard[1])
     for _ in range(_CORRECTIONS):
-        if abs(change) * max(work.hard[0], work.hard[1]) < _NEAR:
+        if abs(change) * hardest < _NEAR:
             _shift(turning, physics, work, change)
             evaluations += 4
         else:
-            evaluations += _attempt(turning, physics, work, when)[2] + 1
+            error, _, count = _attempt(turning, physics, work, when)
+            evaluations += count + 1
+        if not error <= 1.0:
+            break
         _look_to(turning, dragging, physics, work)
         better = min(most, max(0.0, when + _correction(work, when)))
         if better == when:
-            break
+            return when, error, evaluations
         change, when = better - when, better
-    return when, evaluations
+    return when, error if abs(change) * hardest < _NEAR else math.inf, evaluations
 
 
 @njit
