@@ -15,7 +15,7 @@ from stiffdice.io.read import open_file
 FORMATS = Path(__file__).parent / "reference" / "formats"
 
 
-@pytest.mark.parametrize("version", ["1.1", "1.2"])
+@pytest.mark.parametrize("version", ["1.1", "1.2", "1.3"])
 def test_the_verdicts_of_a_sweep_are_those_of_its_runs(version):
     """Each cell of a judged sweep says how many of its members ended how."""
     path = FORMATS / version / "sweep.h5"
@@ -42,3 +42,10 @@ def test_a_file_without_runs_has_no_verdicts(name):
     dataset = open_file(FORMATS / "1.2" / name)
     assert json.loads(inspection.as_json(dataset))["verdicts"] == {}
     assert "  none: this file holds no runs" in inspection.as_text(dataset, name).splitlines()
+
+
+def test_an_apex_ratio_that_nothing_was_measured_for_is_not_shown_as_a_number():
+    run = open_file(FORMATS / "1.2" / "run.h5")
+    assert "apex_ratio = " in inspection.as_text(run, "run.h5")
+    none = inspection.as_text(run.assign(apex_ratio=run.apex_ratio * 0), "run.h5")
+    assert "apex_ratio: no rebound to compare" in none

@@ -49,12 +49,18 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
     total = sum(counts.values())
     if total == 1:
         measures = [
-            f"  {name} = {float(variable):.6g}: {variable.attrs['long_name']}"
+            _measured(str(name), variable)
             for name, variable in dataset.data_vars.items()
             if variable.ndim == 0 and str(name).endswith(("_ratio", "_error", "_phase"))
         ]
         return [f"  {dataset.attrs.get('verdict_text', next(iter(counts)))}", *measures]
     return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
+
+
+def _measured(name: str, variable: xr.DataArray) -> str:
+    if name == "apex_ratio" and not float(variable):
+        return f"  {name}: no rebound to compare with the one before"
+    return f"  {name} = {float(variable):.6g}: {variable.attrs['long_name']}"
 
 
 SHOWN = 10  # bounces of a ledger

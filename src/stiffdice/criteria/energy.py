@@ -7,8 +7,9 @@ that it can never give back would dilute every gain.
 
 In a bounce the energy of a scheme swings by a part of (ωh)² of it, and comes back; so contact is not looked at, but in
 two cases. A cube that was on the ground at its launch is judged by its mechanical energy, with the springs', until it
-leaves the ground. A cube that is on the ground at the end has at least the energy of its motion along the ground, of
-its spin, and m g z.
+leaves the ground. It has at least the energy of its motion along the ground, of its spin, and m g z, the velocity as
+stored: friction that throws it to and fro from step to step cancels out of the velocity at the place. So has a cube
+that is on the ground at the end.
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ def observe(
         _count(slots, _flying(sight, physics, state))
     elif slots[3] > 0.0:
         _count(slots, _mechanical(sight, model, law, physics, state))
+        _count(slots, _without_springs(physics, state))
     return slots[0], sight.held > 0.0
 
 
@@ -69,8 +71,7 @@ def observe(
 def finish(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
     """Count the last state, if it is on the ground, by the part of its energy that no spring swings with."""
     if sight.clearance <= 0.0:
-        along = energy.kinetic(physics, state) - 0.5 * physics.mass * speed_of(physics, state) ** 2
-        _count(slots, along + energy.potential(physics, state))
+        _count(slots, _without_springs(physics, state))
 
 
 @njit
@@ -83,6 +84,13 @@ def ceiling(slots: Any) -> float:
 def _count(slots: Any, now: float) -> None:
     ratio = 1.0 + (now - slots[1]) / slots[2]
     slots[0] = max(slots[0], ratio)
+
+
+@njit
+def _without_springs(physics: Physics, state: Any) -> float:
+    """Return the energy of the motion along the ground and of the spin, and m g z [J]."""
+    along = energy.kinetic(physics, state) - 0.5 * physics.mass * speed_of(physics, state) ** 2
+    return along + energy.potential(physics, state)
 
 
 @njit
