@@ -29,7 +29,16 @@ _STARTING = 0.12  # of Snakemake, to choose and start a job
 
 # Of an experiment and of a timing: by the axis or problem that its options name, or else by its measure.
 _EXPERIMENT = {
-    **{"bounce-map": 2.4, "rocking": 1.3, "ledger": 0.8, "extremes": 1.0, "chatter": 0.8, "precision": 1.2},
+    **{
+        "bounce-map": 2.4,
+        "apex-edge": 32.0,
+        "held": 16.0,
+        "rocking": 1.3,
+        "ledger": 0.8,
+        "extremes": 1.0,
+        "chatter": 0.8,
+        "precision": 1.2,
+    },
     **{"pieces": 5.0, "work-precision": 33.0, "engine-contact": 2.0, "engine-limits": 2.6, "engine-throw": 6.5},
     **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},
     **{"flat-bounce": 25.0, "sliding-bounce": 21.0, "tumbling-throw": 75.0},
