@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import signal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,9 @@ from stiffdice import study, sweep
 from stiffdice.io.read import parts
 from stiffdice.scene import Scene, from_mapping
 from tests import rounds
+
+# A shell that runs the tests in the background lets them, and all that they start, ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The first call of a kernel may compile it.
 settings.register_profile("stiffdice", deadline=None)

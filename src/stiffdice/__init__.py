@@ -1,28 +1,25 @@
-"""How many time steps does a stiff ground cost, and what do you get for them?"""
+"""How many time steps does a stiff ground cost, and what do you get for them?
+
+Public: `open_results`.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from os import PathLike
-
-    import xarray
+import importlib
+from typing import Any
 
 __version__ = "0.1.0"
 
+# By the module that has it: loaded when asked for, so that importing the package takes no time; and named, not
+# imported, because the digest of all code follows what this file imports (`provenance.py`).
+_PUBLIC = {"open_results": "stiffdice.io.labels"}
 
-def open_results(path: str | PathLike[str]) -> xarray.Dataset:
-    """Return the dataset in a file of stiffdice, loaded, with enums as words: `sel(contact="gated")`, `sel(axis="z")`.
 
-    `xarray.open_dataset` opens the same file with the enums as the numbers that are stored. Raises
-    stiffdice.errors.InputError, naming the file, if it cannot be read or trusted (docs/trust.md).
-    """
-    # These take about a second to import; the package itself takes none.
-    from stiffdice.io import quarantine
-    from stiffdice.io.labels import labelled
-    from stiffdice.io.read import open_file
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_PUBLIC[name]), name)
 
-    name = str(path)
-    quarantine.admit(name)
-    return labelled(open_file(name))
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_PUBLIC])

@@ -409,10 +409,11 @@ def _leap(
     held = seen.held
     skipped = phases.skip(scheme, model, law, physics, state, seen, most)
     most = min(most - skipped, left)
-    # Where the motion is compared, known by phases, has just come to rest or never left the ground, every step counts.
+    # Every step counts where the motion is compared, known by phases, has just come to rest, or goes on without ever
+    # having left the ground.
     if (
         compared
-        or remembered.energy[3] > 0.0
+        or (remembered.energy[3] > 0.0 and seen.still == 0.0)
         or seen.held > held
         or phases.follows(scheme, model, physics, state, seen)
     ):

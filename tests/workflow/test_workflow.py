@@ -317,7 +317,7 @@ def test_a_study_that_is_not_there_is_one_line(finished, name):
     assert done.returncode == 2
     lines = [line for line in done.stderr.splitlines() if not line.startswith("Using workflow specific profile")]
     assert len(lines) == 1
-    assert re.match(r"stiffdice: config/.*(letters, digits, hyphens and underscores|No such file)", lines[0])
+    assert re.match(r"stiffdice: config/.*(letters, digits, hyphens and underscores|there is no study)", lines[0])
 
 
 @pytest.mark.long

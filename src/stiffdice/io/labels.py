@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from os import PathLike
+
 import numpy as np
 import xarray as xr
 
+from stiffdice.io import quarantine
 from stiffdice.io.enums import meanings_of
+from stiffdice.io.read import open_file
 
 _FLAGS = ("flag_values", "flag_meanings")
+
+
+def open_results(path: str | PathLike[str]) -> xr.Dataset:
+    """Return the dataset in a file of stiffdice, loaded, with enums as words: `sel(contact="gated")`, `sel(axis="z")`.
+
+    `xarray.open_dataset` opens the same file with the enums as the numbers that are stored. Raises
+    stiffdice.errors.InputError, naming the file, if it cannot be read or trusted (docs/trust.md).
+    """
+    name = str(path)
+    quarantine.admit(name)
+    return labelled(open_file(name))
 
 
 def labelled(dataset: xr.Dataset) -> xr.Dataset:
