@@ -84,6 +84,13 @@ def node_of(
 
 
 @njit
+def push_of(physics: Physics, bits: int, clearance: float, speed: float) -> float:
+    """Return the normal force [N] on a node that is pushed; clearance [m], speed [m/s]: away from the ground."""
+    push = -physics.damping * speed
+    return push - physics.stiffness * clearance if bits & BELOW else push
+
+
+@njit
 def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, rate: Any) -> None:
     """Set `rate` to the motion's time derivative in a regime (equations 3 to 5, 8, 10; q' = ω q/2).
 
@@ -96,9 +103,7 @@ def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion:
             continue
         rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-        push = -physics.damping * speed
-        if regime[k] & BELOW:
-            push -= physics.stiffness * (height + physics.nx * rx + physics.ny * ry + physics.nz * rz)
+        push = push_of(physics, regime[k], height + physics.nx * rx + physics.ny * ry + physics.nz * rz, speed)
         sx, sy, sz = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
         grip = physics.friction * push / (math.sqrt(sx * sx + sy * sy + sz * sz) + physics.cutoff)
         gx = push * physics.nx - grip * sx

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.compiled import njit
-from stiffdice.regime import BELOW, NODES, PUSHED, node_of
+from stiffdice.regime import BELOW, NODES, PUSHED, node_of, push_of
 from stiffdice.state import Physics
 
 
@@ -90,9 +90,7 @@ def straighten(turning: bool, physics: Physics, nodes: Any, regime: Any, motion:
             continue
         rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-        push = -physics.damping * speed
-        if regime[k] & BELOW:
-            push -= physics.stiffness * (height + physics.nx * rx + physics.ny * ry + physics.nz * rz)
+        push = push_of(physics, regime[k], height + physics.nx * rx + physics.ny * ry + physics.nz * rz, speed)
         slip[0], slip[1], slip[2] = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
         _rubbing(physics, slip, about[k], part)
         long = math.sqrt(_dot(slip, slip)) + physics.cutoff
