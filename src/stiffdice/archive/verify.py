@@ -23,7 +23,7 @@ from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import quarantine, schema
 from stiffdice.io.enums import meanings_of
 from stiffdice.io.read import open_file, parts
-from stiffdice.sanity import sweeps
+from stiffdice.sanity import sweeps, words
 
 CRATE = "ro-crate-metadata.json"
 
@@ -334,7 +334,7 @@ class _Files:
             raise self._refused[str(path)]
 
     def _check_dataset(self, name: str, dataset: xr.Dataset, where: str = "") -> None:
-        problems = schema.problems(dataset)
+        problems = schema.problems(dataset) + words.problems(dataset)
         version = str(dataset.attrs.get("format_version", ""))
         if version not in _BEFORE_SANITY:
             problems += sanity.problems(dataset)
