@@ -47,13 +47,13 @@ class Report:
         self.problems += [Problem(file, reason) for reason in reasons]
 
     def lines(self) -> list[str]:
-        """Return it for people: what was checked, what was not, a line for all that fails, and the end of it."""
+        """Return it for people: what was checked, a line for all that fails, and the end of it with what was not."""
         checked = ", ".join(_counted(what, number) for what, number in self.counts.items())
         lines = [f"{self.path}: {self.kind}; checked: {checked}"]
-        lines += [f"not checked: {note}" for note in self.notes]
         lines += [f"FAILS: {problem.file}: {problem.reason}" for problem in self.problems]
         files = len({problem.file for problem in self.problems})
-        lines.append("nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted")
+        end = "nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted"
+        lines.append("; not checked: ".join([end, *([", ".join(self.notes)] if self.notes else [])]))
         return [shown(line) for line in lines]
 
     def as_json(self) -> str:
