@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 import yaml
 
+from stiffdice.errors import printable
 from stiffdice.io.enums import meanings_of
 from stiffdice.verdict import Verdict
 
@@ -32,7 +33,7 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
     if _has_ledger(dataset):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
     lines += ["", "variables", *_variables(dataset)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _plain(value: Any) -> Any:

@@ -254,7 +254,7 @@ def type_by_reference(file):
     del file["type"]
 
 
-@trick("�\\[31mred: allowed in a name are letters")
+@trick(r"\\x1b\[31mred: allowed in a name are letters")
 def name_that_colours_a_terminal(file):
     file["\x1b[31mred"] = 1.0
 

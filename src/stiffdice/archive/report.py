@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from stiffdice.errors import printable
+
 
 class Problem(NamedTuple):
     """A file that fails, by its path within what was checked, and why."""
@@ -54,7 +56,7 @@ class Report:
         files = len({problem.file for problem in self.problems})
         end = "nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted"
         lines.append("; not checked: ".join([end, *([", ".join(self.notes)] if self.notes else [])]))
-        return [shown(line) for line in lines]
+        return [printable(line) for line in lines]
 
     def as_json(self) -> str:
         """Return it for programs."""
@@ -72,8 +74,3 @@ class Report:
 def _counted(what: str, number: int) -> str:
     words = what.replace("hdf5", "HDF5").replace("_", " ")
     return f"{number} {words.removesuffix('s') if number == 1 else words}"
-
-
-def shown(text: str) -> str:
-    """Return text from elsewhere as a terminal can take it: on one line, with nothing that it would obey."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

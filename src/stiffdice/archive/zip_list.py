@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from stiffdice.errors import InputError, RefusedError
+from stiffdice.errors import InputError, RefusedError, printable
 
 
 class Limits(NamedTuple):
@@ -229,7 +229,7 @@ def _name_of(raw: bytes, flags: int) -> str:
         name = raw.decode("utf-8" if flags & _UTF_8 else "ascii")
     except UnicodeDecodeError:
         raise RefusedError(f"{raw!r}: a name that is not UTF-8") from None
-    shown = repr(name) if not name.isprintable() else name
+    shown = printable(name)
     if len(raw) > _LONGEST_NAME:
         raise RefusedError(f"{shown[:80]}...: a name of {len(raw)} bytes; allowed are {_LONGEST_NAME}")
     if not name.isprintable():  # control characters, NUL, and what turns the direction of text around
