@@ -275,7 +275,11 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         (f"{SWEEP}.early_stop", 3, f"{SWEEP}.early_stop = 3: allowed is true or false"),
         (f"{SWEEP}.horizon", 11, f"{SWEEP}: horizon = 11: allowed is a number <= duration = 10 [s]"),
         (f"{SWEEP}.horizon", 0, f"{SWEEP}.horizon = 0: allowed is a finite number > 0 [s]"),
-        (f"{SWEEP}.seconds_per_job", 0, f"{SWEEP}.seconds_per_job = 0: allowed is a number > 0, at most 1e6 [s]"),
+        (f"{SWEEP}.seconds_per_job", 0, f"{SWEEP}.seconds_per_job = 0: allowed is a number from 1e-9 to 1e6 [s]"),
+        (f"{SWEEP}.seconds_per_job", 1e-300, f"{SWEEP}.seconds_per_job = 1e-300: allowed is a number from 1e-9 to 1e6"),
+        (f"{SWEEP}.scene", "\0", r"\x00: allowed is text without NUL and surrogates"),
+        (f"{SWEEP}.scene", "\ud800", r"\ud800: allowed is text without NUL and surrogates"),
+        ("runs.figure-04.scene", "\0", r"\x00: allowed is text without NUL and surrogates"),
         (
             f"{SWEEP}.omega_h",
             [],

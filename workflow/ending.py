@@ -7,7 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from stiffdice.catalogue import DRAWINGS
-from stiffdice.errors import StiffdiceError
+from stiffdice.errors import StiffdiceError, printable
 from stiffdice.io import yaml_file
 
 SCHEMA = "workflow/schemas/study.schema.yaml"
@@ -47,7 +47,7 @@ def open_first(root: Path, study: str) -> str:
             for suffix in (".svg", ".gif", ".md"):
                 path = Path("results", study, kind, f"{name}{suffix}")
                 if (root / path).is_file():
-                    return f"open first: {path} ({part['title']})"
+                    return printable(f"open first: {path} ({part['title']})")
     return ""
 
 

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from stiffdice import __version__, checks
 from stiffdice.commands import advise, archive, bench, diff, inspect, rebuild, run, status, verify
-from stiffdice.errors import StiffdiceError
+from stiffdice.errors import StiffdiceError, printable
 
 EXAMPLES = """\
 examples:
@@ -80,6 +80,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("stiffdice: not enough memory; keep fewer samples with a larger --every", file=sys.stderr)
         return 2
     except OSError as error:  # no room for the compiled kernel, say
-        print(f"stiffdice: {error}", file=sys.stderr)
+        print(f"stiffdice: {printable(error)}", file=sys.stderr)
         return 2
     return status or 0

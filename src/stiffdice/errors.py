@@ -7,14 +7,19 @@ from typing import Self
 LONGEST = 1000  # signs of a message
 
 
+def printable(text: object) -> str:
+    """Return text on one line, with nothing that a terminal obeys: such characters by their escapes, as `\\x1b`."""
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in str(text))
+
+
 class StiffdiceError(Exception):
     """An error whose message is written for the person who ran the command: one line, exit status 2.
 
-    What a file says may be in it, so signs that would break the line, or move the terminal, are told by their number.
+    What a file says may be in it, so it is made `printable`.
     """
 
     def __init__(self, message: str = "") -> None:
-        told = "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode() for sign in message)
+        told = printable(message)
         super().__init__(told if len(told) <= LONGEST else told[: LONGEST - 3] + "...")
 
 

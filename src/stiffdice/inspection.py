@@ -10,10 +10,13 @@ import numpy as np
 import xarray as xr
 import yaml
 
+from stiffdice.errors import printable
 from stiffdice.io.enums import meanings_of
+from stiffdice.verdict import Verdict
 
 _LONG = (
     *("title", "Conventions", "history", "source", "references", "scene"),
+    "verdict_text",  # of older files; the sentence follows from the verdict
     *("scene_digest", "config_digest", "code_digest", "runs_digest", "judging_code_digest", "analysis_code_digest"),
 )
 
@@ -30,7 +33,7 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
     if _has_ledger(dataset):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
     lines += ["", "variables", *_variables(dataset)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _plain(value: Any) -> Any:
@@ -53,8 +56,13 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
             for name, variable in dataset.data_vars.items()
             if variable.ndim == 0 and str(name).endswith(("_ratio", "_error", "_phase"))
         ]
-        return [f"  {dataset.attrs.get('verdict_text', next(iter(counts)))}", *measures]
+        return [f"  {_sentence(next(iter(counts)))}", *measures]
     return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
+
+
+def _sentence(name: str) -> str:
+    """Return a verdict as a sentence; the name itself of one that a later version has."""
+    return Verdict[name.upper()].sentence if name.upper() in Verdict.__members__ else name
 
 
 def _measured(name: str, variable: xr.DataArray) -> str:

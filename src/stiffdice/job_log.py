@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from stiffdice.errors import StiffdiceError
+from stiffdice.errors import StiffdiceError, printable
 
 # Of a log from elsewhere no more than so many bytes are read.
 _MOST = 1 << 20
@@ -100,11 +100,11 @@ def read(path: Path) -> Told | None:
     return Told(
         begun=_time(first[1]) if first else None,
         process=int(first[2]) if first else 0,
-        host=_printable(first[3]) if first else "",
+        host=printable(first[3]) if first else "",
         progress=min(int(shares[-1]) / 100, 1.0) if shares else 0.0,
         cells=int(counts[-1]) if counts else None,
         ending=(end[1] or end[3]) if end else "",
-        reason=_printable(end[4] or "") if end else "",
+        reason=printable(end[4] or "") if end else "",
         written=written,
         empty=not text,
     )
@@ -115,11 +115,6 @@ def _time(text: str) -> datetime | None:
         return datetime.strptime(text, _TIME).replace(tzinfo=UTC)
     except ValueError:  # month 13
         return None
-
-
-def _printable(text: str) -> str:
-    """Return text that cannot move a terminal's cursor."""
-    return "".join(part if part.isprintable() else "?" for part in text)
 
 
 def is_here(told: Told) -> bool:

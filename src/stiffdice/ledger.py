@@ -56,6 +56,9 @@ AMOUNTS = {
     "gravity_defect": "work of the weight less the potential energy given up, with what the velocity's lag makes of it",
     "kick_defect": "kinetic energy gained less the work of all forces",
 }
+# Words of `bounce_ended`.
+ENDED = ("in_contact", "in_air")
+
 _DAMPING, _DRAG, _FRICTION, _SPRING, _GRAVITY, _SPRING_DEFECT, _GRAVITY_DEFECT, _KICK_DEFECT = range(len(AMOUNTS))
 _SIZE = len(AMOUNTS)
 _FORCES = 4  # those of the ground, in the order of AMOUNTS: damping, drag, friction, springs
@@ -430,7 +433,7 @@ def variables(ledger: Ledger) -> dict[str, Any]:
     }
     totals |= {name: (values, f"{text}, in the run", "J") for name, values, text in _booked(ledger.run)}
     totals |= {f"flight_{name}": (values, f"{text}, in flights", "J") for name, values, text in _booked(ledger.flights)}
-    ended = enum_attributes("whether the bounce was over at the last step booked", ["in_contact", "in_air"])
+    ended = enum_attributes("whether the bounce was over at the last step booked", ENDED)
     return (
         {name: ((), value, {"long_name": text, "units": unit}) for name, (value, text, unit) in totals.items()}
         | {

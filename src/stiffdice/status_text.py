@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from stiffdice.disk_use import Use
+from stiffdice.errors import printable
 from stiffdice.status import Cells, Standing, State, Status
 
 _LABEL = 12
@@ -36,7 +37,7 @@ def as_text(status: Status) -> str:
         lines += ["", f"not made because of that: {_names(status.stuck)}"]
     lines += ["", *_disk(status.use, sum(cells.runs for cells in status.cells.values()))]
     lines += [line for told in status.study.left_out for line in ("", told)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def as_data(status: Status) -> dict[str, Any]:
@@ -73,7 +74,7 @@ def failures(status: Status) -> str:
         lines.append(f"  not made because of that: {_names(status.stuck)}")
     if status.ready:
         lines.append(f"  not made, and no log says why: {_names(status.ready)}")
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _row(label: str, text: str) -> str:

@@ -61,6 +61,15 @@ class PlannedFigure(NamedTuple):
     title: str
     timings: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        """Return what Snakemake's report shows of it: inside a script element, which a `</script>` in it would end."""
+        return repr(self).replace("<", r"\x3c")
+
+    @property
+    def caption(self) -> str:
+        """The title for a caption in reStructuredText, in which it has no markup."""
+        return re.sub(r"([^a-zA-Z0-9\s])", r"\\\1", " ".join(self.title.split()))
+
 
 @dataclass(frozen=True)
 class Study:

@@ -233,6 +233,10 @@ def test_a_bomb_is_refused_before_anything_is_unpacked(tmp_path):
     refused(path, "zeros: 2000000 bytes out of")
     with pytest.raises(RefusedError, match="more than 1000 bytes"):
         members(packed(tmp_path / "a.zip"), Limits(size=1000))
+    with pytest.raises(RefusedError, match="more than 2 folders"):  # config, results, results/tiny
+        members(packed(tmp_path / "a.zip"), Limits(folders=2))
+    with pytest.raises(RefusedError, match=r"results/tiny/b.h5\.\.\.: 3 parts in a name; allowed are 2"):
+        members(packed(tmp_path / "a.zip"), Limits(depth=2))
     with pytest.raises(RefusedError, match="3 members; allowed are 2"):
         members(packed(tmp_path / "a.zip"), Limits(members=2))
 
@@ -331,3 +335,10 @@ def test_no_change_to_a_zip_file_makes_a_file_elsewhere_or_a_crash(tmp_path_fact
     told = {member.name: (member.size, member.checksum) for member in members(path) if not member.is_folder}
     assert told == {name: (len(content), zlib.crc32(content)) for name, content in unpacked(top / "out").items()}
     assert not any(place.is_symlink() for place in (top / "out").rglob("*"))
+
+
+def test_names_that_are_nothing_but_folders_are_refused_at_once(tmp_path):
+    """500 names of 505 parts stand for 250,000 folders; 10,001 flat ones are too many, too."""
+    deep = {f"{number}/{'a/' * 503}x": b"" for number in range(500)}
+    refused(packed(tmp_path / "a.zip", deep), "505 parts in a name; allowed are 20")
+    refused(packed(tmp_path / "a.zip", {f"{number}/x": b"" for number in range(10_001)}), "more than 10000 folders")

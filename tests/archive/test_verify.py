@@ -5,6 +5,7 @@ import hashlib
 import json
 import shutil
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,6 +81,9 @@ def folder(made, tmp_path):
 def light(made, tmp_path):
     """A copy without the sweep, which takes longest to check."""
     return sealed(shutil.copytree(made, tmp_path / "light", ignore=shutil.ignore_patterns("sweeps")))
+
+
+FORMATS = Path(__file__).parents[1] / "reference" / "formats"
 
 
 def failing(report):
@@ -272,3 +276,29 @@ def test_the_command_says_it_for_programs_and_for_scripts(light, capsys):
     assert main(["verify", str(light), "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
     assert told["problems"][0]["file"] == "read me.txt" and told["checked"]["digests"] == 4
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("1.3/frontier.h5", "edges and power laws of frontiers apart from their sweep"),
+        ("1.3/sweep.h5", "counts of sweeps and surveys apart from their shards"),
+        ("1.3/shard.h5", "measures and contact laws of shards apart from their sweep"),
+        ("1.3/experiment.h5", "numbers of experiments and timings (no other file has them)"),
+        ("1.1/run.h5", "numbers in files of format 1.1 (they have no seal, so no change of them is seen)"),
+        ("1.0/run.h5", "numbers in files of format 1.0 (they have no seal, so no change of them is seen)"),
+    ],
+)
+def test_the_last_line_says_what_could_not_be_checked(file, words):
+    report = verify(FORMATS / file)
+    assert report.ok and report.lines()[-1] == f"nothing fails; not checked: {words}"
+
+
+def test_the_last_line_of_a_run_holds_nothing_back(folder):
+    assert verify(folder / RUN).lines()[-1] == "nothing fails"
+
+
+def test_a_sweep_without_its_shards_says_so(folder):
+    for path in (*(folder / SWEEP / "shards").iterdir(), folder / SWEEP / "shards.csv"):
+        path.unlink()
+    assert "counts of sweeps and surveys apart from their shards" in verify(folder / SWEEP).lines()[-1]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import re
+import struct
+import zlib
 
 import h5py
 import numpy as np
@@ -123,10 +125,26 @@ def absurd_dimension(file):
     )
 
 
-@trick("holds 24 GB: allowed are 17.2 GB")
+@trick("holds 24 GB in a file of .* kB: allowed are 537 MB")
 def too_much_in_all(file):
     for name in ("more", "most"):
         file.create_dataset(name, (12_000, 1_000_000), "i1", chunks=(1, 1_000_000), compression="gzip")
+
+
+@trick("holds 629 MB in a file of .* kB: allowed are 537 MB")
+def zeros_that_pack_well(file):
+    """Every chunk is there and sound, and stands for a thousand times what it takes."""
+    size = structure.LARGEST_PIECE // 8
+    more = file.create_dataset("more", (300 * size,), "f8", chunks=(size,), compression="gzip")
+    block = zlib.compress(bytes(structure.LARGEST_PIECE), 9)
+    for number in range(300):
+        more.id.write_direct_chunk((number * size,), block)
+
+
+@trick("ratio: more than 10000000 characters in the attributes")
+def much_text_in_all(file):
+    for number in range(101):
+        file["ratio"].attrs[f"a{number}"] = "x" * 100_000
 
 
 @trick("more: 1 of its 50 chunks are there")
@@ -236,7 +254,7 @@ def type_by_reference(file):
     del file["type"]
 
 
-@trick("�\\[31mred: allowed in a name are letters")
+@trick(r"\\x1b\[31mred: allowed in a name are letters")
 def name_that_colours_a_terminal(file):
     file["\x1b[31mred"] = 1.0
 
@@ -543,3 +561,21 @@ def test_files_of_runs_have_cells(tmp_path):
     write_dataset(whole()[["total"]].drop_vars(["member", "stiffness"], errors="ignore"), tmp_path / "x.h5")
     with pytest.raises(RefusedError, match="has no dimension cell"):
         list(parts(tmp_path / "x.h5", 7))
+
+
+def test_a_chunk_where_no_values_are_is_refused(stored):
+    """One number in the tree of the chunks: the library would give zeros for the values that are gone."""
+    with h5py.File(stored, "a") as file:
+        more = file.create_dataset("more", data=np.arange(1.0, 3001.0), chunks=(1000,), compression="gzip")
+        more.attrs.update(ABOUT)
+    image = bytearray(stored.read_bytes())
+    key = bytes(4) + struct.pack("<QQ", 2000, 0)  # no filter left out, where the chunk begins
+    place = image.find(key)
+    assert place > 0 and image.find(key, place + 1) < 0
+    image[place + 4 : place + 12] = struct.pack("<Q", 9000)
+    stored.write_bytes(image)
+    with h5py.File(stored) as file:
+        assert file["more"].id.get_num_chunks() == 3 and not file["more"][2000:].any()
+    seal.seal(stored)
+    with pytest.raises(RefusedError, match=r"more: a chunk at \(9000,\), where none of its values are"):
+        open_file(stored)

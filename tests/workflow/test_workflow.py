@@ -29,6 +29,7 @@ from stiffdice.simulate import simulate
 ROOT = Path(__file__).parent.parent.parent
 WORK = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml", "set": ["duration=3"]}
 FEW = {"stiffness": [100], "per_decade": 1, "methods": ["symplectic_euler", "scipy_lsoda"]}
+TITLE = "Books </script><script>alert(1)</script>"
 TINY = {
     "question": "Does all of it work?",
     "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10}},
@@ -51,7 +52,7 @@ TINY = {
     "figures": {
         "position": {"draw": "position", "run": "stiff", "title": "Position"},
         "frontier": {"draw": "frontier", "of": ["steps"], "title": "Frontier"},
-        "books": {"draw": "ledger", "of": ["books"], "title": "Books"},
+        "books": {"draw": "ledger", "of": ["books"], "title": TITLE},
         "times": {"draw": "work-precision", "of": ["work"], "timings": ["work"], "title": "Times"},
     },
     "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
@@ -333,6 +334,7 @@ def test_the_report_works_without_a_network(finished):
     text = (finished.folder / "report.html").read_text()
     assert "Frontier" in text
     assert "first pass" in text
+    assert "<script>alert" not in text and "Books &lt;/script&gt;" in text
 
 
 def test_lint_finds_nothing(finished):

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -22,11 +22,10 @@ from pathlib import Path
 from stiffdice import catalogue
 from stiffdice import study as studies
 from stiffdice.archive import manifest
-from stiffdice.archive.report import shown
 from stiffdice.archive.unzip import unzip
 from stiffdice.archive.verify import verify
 from stiffdice.diff import compare
-from stiffdice.errors import InputError, RefusedError, StiffdiceError
+from stiffdice.errors import InputError, RefusedError, StiffdiceError, printable
 from stiffdice.io import yaml_file
 
 LAST_LINES = 20  # of a run that failed, to show
@@ -40,7 +39,14 @@ Tell = Callable[[str], None]
 
 
 class RunError(StiffdiceError):
-    """The run of an archive's own workflow failed; told with its last lines."""
+    """The run of an archive's own workflow failed; told with its last lines, each `printable`."""
+
+    def __init__(self, message: str, last: Sequence[str]) -> None:
+        super().__init__(message)
+        self._last = [printable(line) for line in last]
+
+    def __str__(self) -> str:
+        return "\n  ".join([super().__str__(), *self._last])
 
 
 @dataclass
@@ -77,7 +83,7 @@ class Rebuilt:
         lines += [f"note: {note}" for note in self.notes]
         if self.folder is not None:
             lines.append(f"it lies in {self.folder}; what was archived in its folder {ARCHIVED}")
-        return [shown(line) for line in lines]
+        return [printable(line) for line in lines]
 
 
 # Beside the new results: those of the archive.
@@ -132,9 +138,7 @@ def _checked(archive: str | Path, place: Path) -> dict[str, str]:
     report = verify(place)
     if not report.ok:
         first = report.problems[0]
-        raise RefusedError(
-            shown(f"{archive}: {first.file}: {first.reason}; not run. stiffdice verify names all that fails")
-        )
+        raise RefusedError(f"{archive}: {first.file}: {first.reason}; not run. stiffdice verify names all that fails")
     return manifest.parse((place / manifest.NAME).read_text(encoding="utf-8"))
 
 
@@ -143,7 +147,7 @@ def _study_of(archive: str | Path, listed: Mapping[str, str]) -> str:
     names = {parts[1] for parts in (name.split("/") for name in listed) if parts[0] == "results" and len(parts) > 2}
     if len(names) != 1 or not studies.NAME.fullmatch(min(names)):
         told = ", ".join(sorted(names)) or "none"
-        raise RefusedError(shown(f"{archive}: holds results of these studies: {told}; allowed is one"))
+        raise RefusedError(f"{archive}: holds results of these studies: {told}; allowed is one")
     for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{min(names)}.yaml"):
         if needed not in listed:
             raise RefusedError(f"{archive}: has no {needed}; it cannot be made again")
@@ -200,9 +204,10 @@ def _run(rebuilt: Rebuilt, place: Path, cores: int, expected: list[str], tell: T
                 running.wait()
     lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     if running.returncode != 0:
-        last = "\n".join(f"  {shown(line)}" for line in lines[-LAST_LINES:])
         where = f", in {rebuilt.folder}" if rebuilt.folder else ""
-        raise RunError(f"{rebuilt.archive}: its run failed{where}, exit status {running.returncode}:\n{last}")
+        raise RunError(
+            f"{rebuilt.archive}: its run failed{where}, exit status {running.returncode}:", lines[-LAST_LINES:]
+        )
     return lines
 
 

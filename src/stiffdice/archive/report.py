@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from stiffdice.errors import printable
+
 
 class Problem(NamedTuple):
     """A file that fails, by its path within what was checked, and why."""
@@ -47,14 +49,14 @@ class Report:
         self.problems += [Problem(file, reason) for reason in reasons]
 
     def lines(self) -> list[str]:
-        """Return it for people: what was checked, what was not, a line for all that fails, and the end of it."""
+        """Return it for people: what was checked, a line for all that fails, and the end of it with what was not."""
         checked = ", ".join(_counted(what, number) for what, number in self.counts.items())
         lines = [f"{self.path}: {self.kind}; checked: {checked}"]
-        lines += [f"not checked: {note}" for note in self.notes]
         lines += [f"FAILS: {problem.file}: {problem.reason}" for problem in self.problems]
         files = len({problem.file for problem in self.problems})
-        lines.append("nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted")
-        return [shown(line) for line in lines]
+        end = "nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted"
+        lines.append("; not checked: ".join([end, *([", ".join(self.notes)] if self.notes else [])]))
+        return [printable(line) for line in lines]
 
     def as_json(self) -> str:
         """Return it for programs."""
@@ -72,8 +74,3 @@ class Report:
 def _counted(what: str, number: int) -> str:
     words = what.replace("hdf5", "HDF5").replace("_", " ")
     return f"{number} {words.removesuffix('s') if number == 1 else words}"
-
-
-def shown(text: str) -> str:
-    """Return text from elsewhere as a terminal can take it: on one line, with nothing that it would obey."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -23,7 +23,7 @@ from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import quarantine, schema
 from stiffdice.io.enums import meanings_of
 from stiffdice.io.read import open_file, parts
-from stiffdice.sanity import sweeps
+from stiffdice.sanity import sweeps, words
 
 CRATE = "ro-crate-metadata.json"
 
@@ -101,7 +101,7 @@ class _Folder:
             self._check_manifest(digests)
             self._check_crate(digests)
         else:
-            report.note(f"digests, as there is no {manifest.NAME}")
+            report.note(f"digests (there is no {manifest.NAME})")
         files, done = _Files(report, self._teller(data, 0.5 if self._is_archive else 0, 1)), set()
         files.try_apart(data)
         for folder in sorted(
@@ -226,16 +226,20 @@ class _Files:
         self._refused = quarantine.refused(files.values())
 
     def check(self, name: str, path: Path) -> None:
-        """Check one file."""
-        if PurePosixPath(name).parent.name == "shards":
+        """Check one file by itself."""
+        kind = "shard"
+        if PurePosixPath(name).parent.name == kind + "s":
             for _ in self._shard(name, path):
                 pass
         else:
-            self._opened(name, path)
+            dataset = self._opened(name, path)
+            kind = "" if dataset is None else sanity.kind_of(dataset)
+        if kind in _ALONE:
+            self._report.note(_ALONE[kind])
 
     def check_sweep(self, folder: str, files: Mapping[str, Path]) -> set[str]:
         """Check a sweep with its shards and its frontier, one against the other; return what was checked."""
-        whole, edges, table = (f"{folder}/{name}" for name in ("sweep.h5", "frontier.h5", "shards.csv"))
+        whole, edges, table = (str(PurePosixPath(folder, name)) for name in ("sweep.h5", "frontier.h5", "shards.csv"))
         there = [name for name in files if PurePosixPath(name).parent == PurePosixPath(folder, "shards")]
         names = self._listed(table, folder, files) if table in files else there
         collected = self._opened(whole, files[whole])
@@ -243,6 +247,7 @@ class _Files:
             self._collect_again(whole, collected, {name: files[name] for name in names})
         else:
             names = []
+            self._report.note(_ALONE["sweep"])
         frontier = self._opened(edges, files[edges]) if edges in files else None
         if collected is not None and frontier is not None:
             self._compare(edges, lambda: sweeps.same_as_found(frontier, collected))
@@ -256,7 +261,9 @@ class _Files:
         except (OSError, KeyError, ValueError, csv.Error) as error:
             self._report.fail(table, f"not a table of shards ({type(error).__name__})")
             return []
-        names = [f"{folder}/shards/{shard}.h5" for shard in shards if shard and _SHARD.fullmatch(shard)]
+        names = [
+            str(PurePosixPath(folder, "shards", f"{shard}.h5")) for shard in shards if _SHARD.fullmatch(shard or "")
+        ]
         if len(names) != len(shards):
             self._report.fail(table, "names a shard that is none; allowed are 12 hexadecimal digits")
         for name in names:
@@ -285,7 +292,7 @@ class _Files:
         if self._unread.isdisjoint(shards):
             self._compare(whole, lambda: sweeps.same_as_collected(collected, again))
         else:
-            self._report.note(f"whether the shards of {whole} add up to it, as not all can be read")
+            self._report.note(f"whether the shards of {whole} add up to it (not all can be read)")
 
     def _compare(self, name: str, compared: Callable[[], list[str]]) -> None:
         try:
@@ -334,14 +341,22 @@ class _Files:
             raise self._refused[str(path)]
 
     def _check_dataset(self, name: str, dataset: xr.Dataset, where: str = "") -> None:
-        problems = schema.problems(dataset)
+        problems = schema.problems(dataset) + words.problems(dataset)
         version = str(dataset.attrs.get("format_version", ""))
         if version not in _BEFORE_SANITY:
             problems += sanity.problems(dataset)
         else:
-            self._report.note(f"whether the numbers in files of format {version} can be")
+            self._report.note(f"numbers in files of format {version} (they have no seal, so no change of them is seen)")
         self._report.fail(name, *(where + problem for problem in problems))
 
+
+# What of a file the checks of one file cannot see, by its kind.
+_ALONE = {
+    "shard": "measures and contact laws of shards apart from their sweep",
+    "sweep": "counts of sweeps and surveys apart from their shards",
+    "frontier": "edges and power laws of frontiers apart from their sweep",
+    "experiment": "numbers of experiments and timings (no other file has them)",
+}
 
 # Files of these formats need not hold all that the checks look at.
 _BEFORE_SANITY = ("1.0", "1.1")

@@ -19,18 +19,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from stiffdice.errors import InputError, RefusedError
+from stiffdice.errors import InputError, RefusedError, printable
 
 
 class Limits(NamedTuple):
     """What an archive may hold at most: bytes unpacked, members, and bytes unpacked for one packed.
 
-    ratio: of members above a megabyte. Deflate cannot do more than 1032; what we pack reaches 30.
+    ratio: of members above a megabyte. Deflate cannot do more than 1032; what we pack reaches 30. folders: in all, also
+    those that are only in names; ours have some dozens. depth: parts of a name; ours have up to 6.
     """
 
     size: int = 20_000_000_000
     members: int = 1_000_000
     ratio: int = 200
+    folders: int = 10_000
+    depth: int = 20
 
 
 LIMITS = Limits()
@@ -84,7 +87,7 @@ def members(path: str | Path, limits: Limits = LIMITS) -> list[Member]:
         if count > limits.members:
             raise RefusedError(f"{count} members; allowed are {limits.members}")
         listed = list(_listed(file, list_start, list_length, count))
-        _check_names(listed)
+        _check_names(listed, limits)
         _check_sizes(listed, limits)
         return _located(file, listed, list_start)
 
@@ -229,7 +232,7 @@ def _name_of(raw: bytes, flags: int) -> str:
         name = raw.decode("utf-8" if flags & _UTF_8 else "ascii")
     except UnicodeDecodeError:
         raise RefusedError(f"{raw!r}: a name that is not UTF-8") from None
-    shown = repr(name) if not name.isprintable() else name
+    shown = printable(name)
     if len(raw) > _LONGEST_NAME:
         raise RefusedError(f"{shown[:80]}...: a name of {len(raw)} bytes; allowed are {_LONGEST_NAME}")
     if not name.isprintable():  # control characters, NUL, and what turns the direction of text around
@@ -248,16 +251,23 @@ def _name_of(raw: bytes, flags: int) -> str:
     return name
 
 
-def _check_names(listed: list[Member]) -> None:
-    """Raise RefusedError if two names are one file somewhere: in any case, in any form of Unicode, or as a folder."""
+def _check_names(listed: list[Member], limits: Limits) -> None:
+    """Raise RefusedError if two names are one file somewhere: in any case, in any form of Unicode, or as a folder.
+
+    Also if they lie too deep, or in too many folders.
+    """
     files: dict[str, str] = {}
     folders: dict[str, str] = {}
     for member in listed:
         parts = member.name.split("/")
+        if len(parts) > limits.depth:
+            raise RefusedError(f"{member.name[:80]}...: {len(parts)} parts in a name; allowed are {limits.depth}")
         above = ["/".join(parts[:depth]) for depth in range(1, len(parts))]
         for folder in [*above, *([member.name] if member.is_folder else [])]:
             if folders.setdefault(_folded(folder), folder) != folder:
                 raise RefusedError(f"{folder}: a name that some systems take for {folders[_folded(folder)]}")
+        if len(folders) > limits.folders:
+            raise RefusedError(f"more than {limits.folders} folders; this is no archive of a study")
         if member.is_folder:
             continue
         if _folded(member.name) in files:

@@ -47,7 +47,7 @@ def _archive(options: argparse.Namespace) -> None:
     from stiffdice import study as studies
     from stiffdice.archive import pack
     from stiffdice.archive.sizes import in_megabytes, text_of
-    from stiffdice.errors import InputError
+    from stiffdice.errors import InputError, printable
 
     root = Path()
     schema = root / "workflow/schemas/study.schema.yaml"
@@ -68,7 +68,7 @@ def _archive(options: argparse.Namespace) -> None:
     for line in study.left_out:
         print(line)
     print(text_of(packed.sizes))
-    print(f"{packed.path}: {in_megabytes(packed.size)}")
+    print(printable(f"{packed.path}: {in_megabytes(packed.size)}"))
 
 
 def _is_archive(path: Path) -> bool:

@@ -7,6 +7,7 @@ import shlex
 import sys
 
 from stiffdice.commands import changes, numbers, output
+from stiffdice.errors import printable
 
 EXAMPLES = """\
 examples:
@@ -115,7 +116,7 @@ def _run(options: argparse.Namespace) -> None:
     model, _ = requirement.chosen(options.model, [scene], scene.duration / steps)
     simulators.check_fit(options.simulator, scheme, scene, model)
     for line in run_text.doubts(scene, model, method, steps):
-        print(f"stiffdice: note: {line}", file=sys.stderr)
+        print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
     with Progress() as progress:
         run = simulate(
             scene,
@@ -134,10 +135,10 @@ def _run(options: argparse.Namespace) -> None:
         dataset = dataset.assign(ledger.variables(books))
     write_dataset(dataset, target)
     for line in filter(None, [*scene.derived, note]):
-        print(line)
+        print(printable(line))
     if options.model == requirement.AUTO:
         print(run.model_reason)
-    print("\n".join(run_text.lines(run, str(target), _advise(options))))
+    print("\n".join(map(printable, run_text.lines(run, str(target), _advise(options)))))
 
 
 def _advise(options: argparse.Namespace) -> str:

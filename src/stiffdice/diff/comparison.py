@@ -12,6 +12,7 @@ from stiffdice.diff.description import ATTRIBUTE, DIMENSIONS, VARIABLE, Aspect
 from stiffdice.diff.files import Cells, Difference
 from stiffdice.diff.folders import SIDE_FILES, SIDE_FOLDERS
 from stiffdice.diff.values import Place, Values
+from stiffdice.errors import printable
 from stiffdice.io.digest import Plain
 
 # Of files, and of variables and attributes of one file: so many are shown to people; of each of many files fewer.
@@ -72,7 +73,7 @@ class Comparison:
         lines += self.notes
         if self.left_out:
             lines.append(f"left out: {_by_folder(self.left_out)}; --all compares them, too")
-        return lines
+        return [printable(line) for line in lines]
 
     @property
     def verdict(self) -> str:
@@ -200,7 +201,7 @@ def _only(side: str, names: Sequence[str]) -> Iterator[str]:
     if names:
         yield ""
         yield f"only in {side}:"
-        yield from (f"  {_printable(name)}" for name in names[:SHOWN])
+        yield from (f"  {name}" for name in names[:SHOWN])
         yield from (f"  {line}" for line in _more(len(names) - SHOWN, "files"))
 
 
@@ -218,11 +219,11 @@ def _by_folder(names: Sequence[str]) -> str:
 
 def _about(part: Difference, shown: int) -> Iterator[str]:
     """Yield how the files of one name differ, line by line, so many variables and attributes of each."""
-    yield from map(_printable, part.unreadable)
+    yield from part.unreadable
     if part.cells is not None:
         yield from _about_cells(part.cells)
     if part.since:
-        yield f"the same before {_printable(part.since)}"
+        yield f"the same before {part.since}"
     for values in part.values[:shown]:
         yield from _about_values(values)
     yield from _more(len(part.values) - shown, "variables")
@@ -262,14 +263,14 @@ def _about_values(values: Values) -> Iterator[str]:
         if count
     ]
     size = _size_of(values)
-    name = _printable(values.variable)
+    name = values.variable
     if values.of == 1 and values.first is not None:
         yield f"{name}: {_pair(values.first)}" + (f", {size}" if size else "") + (", 0 ulp" if values.signs else "")
         return
     count = f"{values.count} of {_count(values.of, 'value')} {'differs' if values.count == 1 else 'differ'}"
     yield f"{name}: {count}" + (f", by up to {size}" if size else "") + (f" ({', '.join(kinds)})" if kinds else "")
     for titles, place in _places(values):
-        yield f"  {titles} at {_printable(place.where)} [{', '.join(map(str, place.index))}]: {_pair(place)}"
+        yield f"  {titles} at {place.where} [{', '.join(map(str, place.index))}]: {_pair(place)}"
 
 
 def _pair(place: Place) -> str:
@@ -277,7 +278,7 @@ def _pair(place: Place) -> str:
 
 
 def _units(values: Values) -> str:
-    return "" if values.units == "1" else _printable(values.units)
+    return "" if values.units == "1" else values.units
 
 
 def _size_of(values: Values) -> str:
@@ -313,12 +314,12 @@ def _key(place: Place) -> tuple[str, tuple[int, ...]]:
 
 
 def _about_aspect(what: str, name: str, a: Plain | None, b: Plain | None, variables: Sequence[str]) -> str:
-    some = ", ".join(map(_printable, variables[:3])) + (f" and {len(variables) - 3} more" if variables[3:] else "")
+    some = ", ".join(variables[:3]) + (f" and {len(variables) - 3} more" if variables[3:] else "")
     if what == VARIABLE:
         side, dimensions = ("B", b) if a is None else ("A", a)
-        return f"{some}: only in {side}, {_printable(str(dimensions or 'one value'))}"
+        return f"{some}: only in {side}, {dimensions or 'one value'}"
     if what == ATTRIBUTE:
-        return f"{some}: {_printable(name)} {_against(a, b)}" if some else f"{_printable(name)}: {_against(a, b)}"
+        return f"{some}: {name} {_against(a, b)}" if some else f"{name}: {_against(a, b)}"
     word = "sizes" if what == DIMENSIONS else what
     return f"{some}: {word} {_against(a or 'one value', b or 'one value')}"
 
@@ -351,10 +352,5 @@ def _plain_text(value: Plain | None) -> str:
 
 
 def _short(text: str) -> str:
-    shown = f"{text[:8]}…" if _DIGEST.fullmatch(text) else _printable(text)
+    shown = f"{text[:8]}…" if _DIGEST.fullmatch(text) else text
     return shown if len(shown) <= _WIDE else f"{shown[: _WIDE - 1]}…"
-
-
-def _printable(text: str) -> str:
-    """Return text that cannot command a terminal."""
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)

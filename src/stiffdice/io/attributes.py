@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 import h5py
 import numpy as np
 
-from stiffdice.errors import RefusedError
+from stiffdice.errors import RefusedError, printable
 from stiffdice.io import FORMAT_VERSION
 
 MOST_ATTRIBUTES = 200  # of a variable, or of the file; the project's own files have up to 25
@@ -171,6 +171,6 @@ def _check_scene(scene: object, digest: object) -> None:
 
 
 def shown(text: object) -> str:
-    """Return what a file says, cut to a readable length, without what a terminal would act on."""
-    plain = "".join(sign if sign.isprintable() else "�" for sign in str(text))
+    """Return what a file says, `printable`, cut to a readable length."""
+    plain = printable(text)
     return plain if len(plain) <= 60 else plain[:57] + "..."

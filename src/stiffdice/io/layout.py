@@ -30,7 +30,8 @@ ENDING_ATTRIBUTES = VERDICT_ATTRIBUTES | {"long_name": "how the run ended whatev
 # What numbers and files depend on besides our code.
 _LIBRARIES = ("numpy", "numba", "llvmlite", "h5py", "h5netcdf", "xarray")
 
-AXIS_ATTRIBUTES = enum_attributes("Cartesian axis, z up", ["x", "y", "z"])
+AXES = ("x", "y", "z")
+AXIS_ATTRIBUTES = enum_attributes("Cartesian axis, z up", AXES)
 
 
 # By the measure's name; those of steps that are counted.
@@ -171,7 +172,6 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
         "criteria": criteria_text(run.tolerances),
         "hop_height": run.hop_height,
         "hop_height_units": "m",
-        "verdict_text": Verdict(run.verdict[0]).sentence,
     }
     if run.scene.derived:
         attributes["scene_derived"] = "; ".join(run.scene.derived)

@@ -101,7 +101,6 @@ KINDS: dict[str, Kind] = {
             "criteria": Attribute(TEXT),
             "tolerance": Attribute(NUMBER, RECOMMENDED),
             "hop_height": Attribute(NUMBER, RECOMMENDED),
-            "verdict_text": Attribute(TEXT, RECOMMENDED),
             "scene_derived": Attribute(TEXT, OPTIONAL),
         },
         {

@@ -21,6 +21,9 @@ MOST_VARIABLES = 1000  # the project's own files have up to 60
 MOST_DIMENSIONS = 8  # of one variable; up to 4
 LARGEST_PIECE = 2 << 20  # bytes of a chunk, or of a variable without chunks; h5py's own choice is 1 MiB at most
 MOST_BYTES = 1 << 34  # of all values of a file
+# Values in memory come to so many bytes for one of the file, or to so many in all: trajectories at rest pack well.
+MOST_RATIO, ALWAYS_ALLOWED = 100, 1 << 29
+MOST_TEXT = 10_000_000  # characters of all attributes; many may share one text in the file
 
 # A deflated block stands for 258 bytes with two bits, at best (RFC 1951, section 3.2.5).
 MOST_GAIN = 1032
@@ -58,10 +61,11 @@ def check(file: h5py.File, length: int) -> Contents:
     if file.userblock_size:
         raise RefusedError(f"has {file.userblock_size} bytes before its HDF5 content; our files have none")
     about = attributes.check_all("the file", file)
-    items = {name: _Item(dataset, attributes.check_all(name, dataset)) for name, dataset in _datasets(file).items()}
+    items = _items(file)
     sizes = {name: _size_of(name, item.dataset) for name, item in items.items()}
-    if sum(sizes.values()) > MOST_BYTES:
-        raise RefusedError(f"holds {_shown(sum(sizes.values()))}: allowed are {_shown(MOST_BYTES)}")
+    total, most = sum(sizes.values()), min(MOST_BYTES, max(ALWAYS_ALLOWED, MOST_RATIO * length))
+    if total > most:
+        raise RefusedError(f"holds {_shown(total)} in a file of {_shown(length)}: allowed are {_shown(most)}")
     stored = _Stored(length)
     for name, item in items.items():
         _check_storage(name, item, sizes[name], stored)
@@ -96,6 +100,17 @@ class _Item(NamedTuple):
     def is_bare(self) -> bool:
         """Whether it only stands for a dimension and has no values."""
         return self.is_scale and _BARE in self.about.get("NAME", "")
+
+
+def _items(file: h5py.File) -> dict[str, _Item]:
+    """Return every dataset with its attributes, by name; raises RefusedError where their text is too long in all."""
+    items, text = {}, 0
+    for name, dataset in _datasets(file).items():
+        items[name] = _Item(dataset, attributes.check_all(name, dataset))
+        text += sum(len(value) for value in items[name].about.values() if isinstance(value, str))
+        if text > MOST_TEXT:
+            raise RefusedError(f"{name}: more than {MOST_TEXT} characters in the attributes of a file")
+    return items
 
 
 def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
@@ -180,6 +195,9 @@ def _check_chunks(name: str, item: _Item, stored: _Stored, gain: int) -> None:
     places = set()
     for chunk in _chunks(dataset) if found else ():
         places.add(chunk.chunk_offset)
+        grid = zip(chunk.chunk_offset, dataset.shape, dataset.chunks, strict=True)
+        if any(offset >= size or offset % step for offset, size, step in grid):
+            raise RefusedError(f"{name}: a chunk at {chunk.chunk_offset}, where none of its values are")
         if chunk.filter_mask:
             raise RefusedError(f"{name}: a chunk without its filters; its checksum would not be checked")
         # Deflate adds a thousandth at most, the checksum four bytes.

@@ -18,6 +18,10 @@ LONGEST_NUMBER = 1000  # digits
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 
 
+# NUL is in no name of a file, a surrogate in no UTF-8 text; YAML has escapes for both.
+_NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")
+
+
 class _Loader(yaml.SafeLoader):
     """YAML 1.1 without its traps: `1.0e4` read as text, `010` as 8, `1:30` as 90, and repeated keys.
 
@@ -69,6 +73,8 @@ def _check_size(node: yaml.Node, sizes: dict[int, int], above: tuple[int, ...]) 
         if isinstance(node, yaml.ScalarNode):
             if node.tag == _INT and len(node.value) > LONGEST_NUMBER:
                 raise InputError(f"{_line(node)}: a number of {len(node.value)} digits: allowed are {LONGEST_NUMBER}")
+            if _NO_TEXT.search(node.value):
+                raise InputError(f"{_line(node)}: {node.value}: allowed is text without NUL and surrogates")
             sizes[id(node)] = 1
         else:
             pairs = isinstance(node, yaml.MappingNode)

@@ -186,6 +186,8 @@ def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: dict[str, npt.Ar
             found.append(f"{name}: is missing")
         elif dataset[name].dims != right.dims or dataset[name].shape != right.shape:
             found.append(f"{name}{dict(dataset[name].sizes)}: allowed is {dict(right.sizes)}")
+        elif dataset[name].attrs.get("flag_meanings") != right.attrs.get("flag_meanings"):
+            found.append(f"{name}: flag_meanings: allowed are {right.attrs.get('flag_meanings')}")
         else:
             found += unequal(name, dataset[name].values, right.values, rooms.get(name, 0.0), "computed again")
     return found

@@ -1,0 +1,70 @@
+"""A title is text in the report, whatever it says: rendered here as Snakemake renders it, with our captions."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import jinja2
+import pytest
+from docutils.core import publish_parts
+from snakemake.iocontainers import Params
+from snakemake.logging import format_dict
+from snakemake.report.html_reporter.data import render_results
+
+from stiffdice.study import PlannedFigure
+
+CAPTIONS = Path(__file__).parents[2] / "workflow" / "report"
+TITLES = [
+    "</script><script>alert(1)</script>",
+    "<img src=x onerror=alert(1)> <!-- <script>",
+    "`press <javascript:alert(1)>`_ here_ |this| *that* :raw:`x`",
+    "x\n\n.. raw:: html\n\n   <script>alert(1)</script>",
+    r"\ back\slash, 1. ωh < 2 & 'more' \"so\"",
+]
+
+
+class Page(HTMLParser):
+    """The elements and the text of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.text = [], []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, attrs))
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.mark.parametrize("kind", ["figure", "table"])
+@pytest.mark.parametrize("title", TITLES)
+def test_a_title_is_text_in_its_caption_and_in_the_settings(kind, title):
+    planned = PlannedFigure("energy", None, ("steps",), title)
+    params = Params(fromdict={kind: planned})
+    snakemake = SimpleNamespace(params=params, wildcards=SimpleNamespace(study="tiny"))
+    caption = jinja2.Template((CAPTIONS / f"{kind}.rst").read_text()).render(snakemake=snakemake)
+    body = publish_parts(caption, writer="html")["body"]
+    found = Page(body)
+    assert all(tag in ("p", "em") and not attrs for tag, attrs in found.tags)
+    assert "".join(found.text).startswith(f"{' '.join(title.split())} (tiny).")
+
+    job = SimpleNamespace(rule=SimpleNamespace(name=kind))
+    result = SimpleNamespace(
+        **dict.fromkeys(("name", "filename", "labels", "mime", "wildcards"), ""),
+        **{"path": Path("x.svg"), "size": 1, "caption": body, "job": job, "params": format_dict(params), "id": "x"},
+    )
+    element = render_results({"": {"": [result]}}, False)
+    page = Page(f'<script id="results">var results = {element};</script><p>after</p>')
+    assert [tag for tag, _ in page.tags] == ["script", "p"]
+    assert json.loads(element)["x.svg"]["job_properties"]["params"] == format_dict(params)
+
+
+def test_a_changed_title_still_is_a_changed_parameter():
+    """Snakemake compares what `repr` gives."""
+    assert repr(PlannedFigure("energy", None, (), "<")) != repr(PlannedFigure("energy", None, (), ">"))
