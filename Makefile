@@ -2,8 +2,8 @@
 
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
-READY := $(VENV)/.installed
+# The folder that the link .venv leads to: what has begun goes on there when a new one takes its place.
+BIN = $(or $(realpath $(VENV)),$(VENV))/bin
 CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
@@ -13,37 +13,35 @@ STUDY ?= paper
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-install: $(READY)  ## set up .venv from the lock file (the other targets do it, too)
+install:  ## set up .venv from the lock files, unless it is what they say (the other targets do it, too; status only tells)
+	@PYTHON="$(PYTHON)" requirements/install
 
-$(READY): requirements/build.lock requirements/requirements.lock pyproject.toml requirements/install
-	@PYTHON="$(PYTHON)" requirements/install $(VENV)
-	@touch $@
-
-install-engines: $(READY)  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
+install-engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
 	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
 
-paper: $(READY)  ## rebuild everything the paper shows, into results/paper/
+paper: install  ## rebuild everything the paper shows, into results/paper/
 	@$(BIN)/python workflow/run.py --cores $(CORES) paper
 
-stability: $(READY)  ## measure what "stable" means, into results/stability/
+stability: install  ## measure what "stable" means, into results/stability/
 	@$(BIN)/python workflow/run.py --cores $(CORES) stability
 
-extremes: $(READY)  ## where and how runs fail at the extremes, into results/extremes/
+extremes: install  ## where and how runs fail at the extremes, into results/extremes/
 	@$(BIN)/python workflow/run.py --cores $(CORES) extremes
 
-tradeoff: $(READY)  ## what accuracy costs by scheme, into results/tradeoff/
+tradeoff: install  ## what accuracy costs by scheme, into results/tradeoff/
 	@$(BIN)/python workflow/run.py --cores $(CORES) tradeoff
 
-elastic: $(READY)  ## a dense grid's answer for fewer runs, into results/elastic/
+elastic: install  ## a dense grid's answer for fewer runs, into results/elastic/
 	@$(BIN)/python workflow/run.py --cores $(CORES) elastic
 
-peers: $(READY)  ## the engines that are installed beside stiffdice, into results/peers/
+peers: install  ## the engines that are installed beside stiffdice, into results/peers/
 	@$(BIN)/python workflow/run.py --cores $(CORES) peers
 
-study: $(READY)  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
+study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
 
-status: $(READY)  ## how far a study is, what failed and why: make status STUDY=NAME
+status:  ## how far a study is, what failed and why: make status STUDY=NAME
+	@PYTHON="$(PYTHON)" requirements/install --check
 	@$(BIN)/stiffdice status '$(STUDY)' || [ $$? -ne 2 ]
 
 report: study  ## results/NAME/report.html: every figure with its caption, code and configuration: make report STUDY=NAME
@@ -52,30 +50,30 @@ report: study  ## results/NAME/report.html: every figure with its caption, code 
 archive: report  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
 	@$(BIN)/stiffdice archive '$(STUDY)'
 
-bench: $(READY)  ## measure how fast it is, into results/bench/, and compare with the last time
+bench: install  ## measure how fast it is, into results/bench/, and compare with the last time
 	@$(BIN)/stiffdice bench
 
-sweep-million: $(READY)  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into results/scale/ (about half an hour)
+sweep-million: install  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into results/scale/ (about half an hour)
 	@$(BIN)/python workflow/million.py $(MILLION)
 
-test: $(READY)  ## run all tests
+test: install  ## run all tests
 	@$(BIN)/python -m pytest
 
-test-fast: $(READY)  ## run the tests but for the broadest
+test-fast: install  ## run the tests but for the broadest
 	@$(BIN)/python -m pytest -m "not long"
 
-test-slurm: $(READY)  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
+test-slurm: install  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
 	@tests/slurm/run $(BIN)/python
 
-lint: $(READY)  ## check style (ruff) and the workflow (snakemake --lint)
+lint: install  ## check style (ruff) and the workflow (snakemake --lint)
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/snakemake --lint
 
-types: $(READY)  ## check types (mypy)
+types: install  ## check types (mypy)
 	@$(BIN)/mypy
 
 check: lint types test  ## all of the above
 
-lock: $(READY)  ## renew the lock files from requirements/*.in (needs uv on the PATH)
+lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
 	@for name in build requirements engines; do \
 	  uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
 	    --no-emit-index-url --custom-compile-command "make lock" \

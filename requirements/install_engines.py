@@ -1,4 +1,5 @@
-"""Install the engines of engines.lock into the virtual environment that runs this, every file checked against its hash.
+"""Install the engines of engines.lock into the virtual environment that runs this, every file checked against its hash:
+install_engines.py [FOLDER_OF_LOCKS [NAME...]].
 
 Each is installed for itself: one that has no wheel for this Python is left out with a line, and so is not in the way of
 the others. Nothing is built.
@@ -63,11 +64,11 @@ def install(blocks: dict[str, str]) -> str:
     return (done.stderr.strip().splitlines() or [f"pip ended with status {done.returncode}"])[-1]
 
 
-def main(folder: Path) -> int:
-    """Install what can be; return 2 if nothing could."""
+def main(folder: Path, *names: str) -> int:
+    """Install what can be, of these engines or of all; return 2 if nothing could."""
     lock = (folder / "engines.lock").read_text(encoding="utf-8")
     ready = 0
-    for engine in engines(folder):
+    for engine in names or engines(folder):
         wrong = install(needed(lock, engine))
         ready += not wrong
         print(f"stiffdice: {engine} is {f'left out: {wrong}' if wrong else 'ready'}", flush=True)
@@ -75,4 +76,4 @@ def main(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
+    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, *sys.argv[2:]))

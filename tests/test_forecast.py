@@ -18,7 +18,7 @@ def load(study_schema, monkeypatch):
 def compiled(monkeypatch, tmp_path):
     """A folder with the kernel of single runs, compiled."""
     (tmp_path / "stiffdice_0").mkdir()
-    (tmp_path / "stiffdice_0/simulate._march-1.py311.nbi").touch()
+    (tmp_path / "stiffdice_0/simulate._march-1.py311.0123456789abcdef.nbc").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 
 

@@ -17,9 +17,8 @@ import lock  # noqa: E402
 def main() -> int:
     """Remove them and return the exit status."""
     try:
-        for project in (ROOT, *(ROOT / "results").iterdir()):  # `make sweep-million` has one of its own
-            for path in (project / lock.FOLDER).glob("*"):
-                lock.hold(project, path.name)
+        for path in lock.files(ROOT):
+            lock.hold(path.parents[len(lock.FOLDER.parts)], path.name)
     except lock.RunningError as error:
         print(f"stiffdice: {error}; nothing was removed", file=sys.stderr)
         return 2

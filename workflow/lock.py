@@ -43,6 +43,23 @@ def hold(root: Path, study: str) -> None:
         pass
 
 
+def files(root: Path) -> list[Path]:
+    """Return the files that are locked while studies are made: of `root`, and of the copy for `make sweep-million`."""
+    return sorted(path for project in (root, root / "results/scale/project") for path in (project / FOLDER).glob("*"))
+
+
+def check_idle(root: Path) -> None:
+    """Raise RunningError if any study of the project in `root` is being made."""
+    for path in files(root):
+        with path.open() as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise RunningError(f"{path.name} is being made: {_told(job_log.read(path))}") from None
+            except OSError:
+                pass
+
+
 def _told(holder: job_log.Told | None) -> str:
     if holder is None or holder.begun is None:
         return "another process has locked it"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import tempfile
 from collections.abc import Iterable
@@ -15,6 +16,12 @@ FEWEST_FILES, FILES_A_CORE = 24, 4  # below, Snakemake fails in ways of its own
 
 class RoomError(Exception):
     """What is missing, in one line."""
+
+
+def check_place(root: Path) -> None:
+    """Raise RoomError if the path of the project has what shells, Snakemake or Python take for their own."""
+    if found := re.search(r"""[\s'"`$;:&|<>(){}*?\[\]!#\\]""", str(root)):
+        raise RoomError(f"{str(root)!r}: {found[0]!r} in a path is not for Snakemake; move the project")
 
 
 def missing(folder: Path) -> str | None:
@@ -43,6 +50,7 @@ def prepare(root: Path, cores: int) -> tuple[dict[str, str], list[str]]:
 
     Temporary files and caches that cannot be where they belong are kept in `root`/.snakemake.
     """
+    check_place(root)
     _open_files(cores)
     if reason := lack_of(root):
         raise RoomError(reason)

@@ -2,7 +2,7 @@
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
-versions that compile them.
+versions that compile them. What is in it is digested, too (`kernel_cache`).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -34,11 +35,10 @@ def _cache_folder() -> Path:
         home = fallback
     if home.name.startswith("kernels-") and home.parent.name == "stiffdice":
         home = home.parent.parent  # a parent process set it to its own folder
-    for folder in (home / "stiffdice" / name, fallback / name):
+    for parent in (home / "stiffdice", fallback):
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            if _has_room(folder) and folder.stat().st_uid == os.getuid():
-                return folder
+            if _is_made(parent) and _is_made(parent / name) and _has_room(parent / name):
+                return parent / name
         except OSError:
             continue
     try:
@@ -48,6 +48,13 @@ def _cache_folder() -> Path:
             f"compiled kernels: neither {home} nor a folder for temporary files can be written ({error.strerror}); "
             "name one that can be in NUMBA_CACHE_DIR"
         ) from None
+
+
+def _is_made(folder: Path) -> bool:
+    """Make a folder if it is not there; return whether it is one, no link to one, ours, and not for all to write."""
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    found = folder.lstat()
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & stat.S_IWOTH
 
 
 def _has_room(folder: Path) -> bool:
@@ -85,6 +92,8 @@ import numba  # noqa: E402
 from numba.core.registry import CPUDispatcher  # noqa: E402
 from numba.extending import overload  # noqa: E402
 
+from stiffdice.kernel_cache import KernelCache  # noqa: E402
+
 setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
 
 
@@ -120,9 +129,15 @@ def njit(*function: Any, **options: Any) -> Any:
     call the function first. What is not kept in the cache on disk is a part of what is, and compiled as such.
     """
     options = {"error_model": "numpy", "fastmath": False} | options
-    if options.get("cache"):
-        compiled: Any = numba.njit
-        return compiled(*function, **options)
+    if options.pop("cache", False):
+
+        def kernel(python: Callable[..., Any]) -> Any:
+            decorate: Any = numba.njit
+            compiled = decorate(python, **options)
+            compiled._cache = KernelCache(python)
+            return compiled
+
+        return kernel(*function) if function else kernel
     options |= {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
     def part(python: Callable[..., Any]) -> _Part:

@@ -111,7 +111,7 @@ def _compiled_for(study: Study, result: Result) -> tuple[str, ...]:
 def _is_compiled() -> bool:
     """Return whether the kernel of single runs lies in the folder that `compiled` has chosen."""
     folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
-    return any(folder.glob("*/simulate._march*.nbi"))
+    return any(folder.glob("*/simulate._march*.nbc"))
 
 
 def slowness() -> float:
