@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice import cli, job_log, results, shards, status, status_text
+from stiffdice import asked, cli, job_log, results, shards, status, status_text
 from stiffdice import study as studies
 from stiffdice.commands import status as command
 from stiffdice.errors import InputError
@@ -35,7 +35,7 @@ class Made:
     """A folder of results, made up."""
 
     def __init__(self, study, folder):
-        self.study, self.folder = study, folder
+        self.study, self.folder, self.asked = study, folder, asked.of(study, ROOT)
         for result in results.of(study):
             self.make(result)
 
@@ -46,7 +46,7 @@ class Made:
         for file in result.files:
             self._path(file).write_bytes(b"x" * 1000)
         cells = [job_log.cells(200, 8)] if result.stage == "shard" else []
-        self.log(result, job_log.begun(), *cells, job_log.done(seconds))
+        self.log(result, job_log.begun(), job_log.asked(self.asked[result]), *cells, job_log.done(seconds))
         self._path(result.benchmark).write_text(f"s\th:m:s\tmax_rss\n{seconds}\t0:00:10\t99.5\n")
 
     def log(self, result, *lines):
@@ -149,7 +149,7 @@ def test_a_job_that_was_killed_is_told_from_one_that_runs(made, gone):
 def test_files_that_are_newer_than_a_log_are_done_whatever_it_says(made, lines):
     """As after a restore; and of a job whose last word found no room on the disk."""
     for result in results.of(made.study):
-        made.log(result, *lines)
+        made.log(result, *lines, job_log.asked(made.asked[result]))
         for file in result.files:
             os.utime(made.folder / file, (LATER, LATER))
     assert made.look().state is State.DONE
@@ -158,7 +158,7 @@ def test_files_that_are_newer_than_a_log_are_done_whatever_it_says(made, lines):
 def test_a_job_without_a_last_word_is_done_if_what_it_should_make_is_newer_than_its_first(made, gone):
     """There was no room for the word; files appear whole, or not at all."""
     shard = made.named("shard")
-    made.log(shard, by(gone), "simulation: 1.0 s")
+    made.log(shard, by(gone), job_log.asked(made.asked[shard]), "simulation: 1.0 s")
     os.utime(made.folder / shard.files[0], (LATER, LATER))
     os.utime(made.folder / shard.log, (LATER + 1, LATER + 1))
     assert made.standing(shard).state is State.DONE
@@ -180,11 +180,11 @@ def test_a_folder_in_the_way_is_told(made):
     assert found.reason.endswith(f"{shard.files[0]}: is in the way: not a regular file")
 
 
-def test_results_without_logs_are_done(made):
-    """As in a folder from elsewhere."""
+def test_results_without_logs_are_stale(made):
+    """Nothing says what was asked of them."""
     shutil.rmtree(made.folder / "logs")
     found = made.look()
-    assert found.state is State.DONE
+    assert {standing.state for standing in found.standings} == {State.STALE}
     assert found.cells["steps-needed"].at_least  # no log says how many cells refined scans have
 
 
@@ -209,6 +209,27 @@ def test_what_stands_on_a_failure_is_not_done(made):
     assert ", collect steps-needed, frontier steps-needed, figure frontier" in told
 
 
+@pytest.mark.parametrize(
+    ("lines", "reason"),
+    [
+        ([job_log.asked("scene 0 plan 0 code 0 inputs 0")], "made from other scene, plan, code, inputs"),
+        ([], "no log says what it was made from"),
+    ],
+)
+def test_what_was_asked_otherwise_is_stale_until_it_is_made_again(made, lines, reason):
+    frontier = made.named("frontier")
+    made.log(frontier, job_log.begun(), *lines, job_log.done(1))
+    found = made.look()
+    assert (made.standing(frontier).state, made.standing(frontier).reason) == (State.STALE, reason)
+    assert [standing.result.name for standing in found.those(State.WAITING)] == ["frontier"]  # the figure of it
+    assert found.state is State.STALE
+    assert f"\n  frontier steps-needed  {reason}\n" in status_text.as_text(found)
+    assert status_text.as_data(found)["results"]["stale"] == 1
+    assert command._exit_status([found]) == 3
+    made.make(frontier)
+    assert made.look().state is State.DONE
+
+
 def test_what_nobody_says_why_is_told(made):
     made.unmake(made.named("figure"))
     assert status_text.failures(made.look()) == "  not made, and no log says why: figure position"
@@ -217,7 +238,7 @@ def test_what_nobody_says_why_is_told(made):
 def test_needs_are_as_the_workflow_has_them(study):
     names = {
         f"{result.stage} {result.name}": {f"{part.stage} {part.name}" for part in below}
-        for result, below in status.needs(study).items()
+        for result, below in results.needs(study).items()
     }
     plan = shards.of(study.sweeps["steps-needed"])
     first, second = ({f"shard steps-needed/{shard}" for shard in shards.rounds(plan, number)} for number in (0, 1))
@@ -350,7 +371,7 @@ def test_programs_get_the_same_numbers(project):
     ended, out, _ = project("quick", "--json")
     data = json.loads(out)
     assert (ended, data["state"]) == (1, "failed")
-    assert data["results"] == {"done": 7, "running": 0, "interrupted": 0, "failed": 1, "waiting": 5}
+    assert data["results"] == {"done": 7, "running": 0, "interrupted": 0, "failed": 1, "stale": 0, "waiting": 5}
     (failed,) = [job for job in data["jobs"] if job["state"] == "failed"]
     assert (failed["name"], failed["reason"], failed["files"]) == (shard.name, "no room", list(shard.files))
     assert datetime.fromisoformat(failed["begun"]) <= datetime.now(UTC)

@@ -20,6 +20,7 @@ _MOST = 1 << 20
 
 _BEGUN = re.compile(r"^begun (\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ) by process (\d{1,10}) on (.+)$", re.MULTILINE)
 _TENTH = re.compile(r"^(\d{1,3})% of the steps done$", re.MULTILINE)
+_ASKED = re.compile(r"^asked: ([a-z0-9 -]{1,200})$", re.MULTILINE)
 _CELLS = re.compile(r"^(\d{1,18}) cells, \d+ runs$", re.MULTILINE)
 _END = re.compile(r"^(?:(done) in ([0-9.]{1,18}) s|(failed|interrupted): (.*))$", re.MULTILINE)
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
@@ -28,7 +29,8 @@ _TIME = "%Y-%m-%dT%H:%M:%SZ"
 class Told(NamedTuple):
     """What a log says so far.
 
-    begun: when (UTC), None if it does not say. process, host: of the job. progress: fraction of the work done. cells:
+    begun: when (UTC), None if it does not say. process, host: of the job. asked: digests of what it was asked
+    (`asked.Asked`), empty if it does not say. progress: fraction of the work done. cells:
     in the finished shard, if it says. ending: `done`, `failed` or `interrupted`; empty without a last word. reason: of
     an ending that is not `done`, one line. written: when the log was last written to (UTC).
     """
@@ -36,6 +38,7 @@ class Told(NamedTuple):
     begun: datetime | None
     process: int
     host: str
+    asked: str
     progress: float
     cells: int | None
     ending: str
@@ -47,6 +50,11 @@ class Told(NamedTuple):
 def begun() -> str:
     """Return the first line of a log: when, and which process on which host."""
     return f"begun {datetime.now(UTC).strftime(_TIME)} by process {os.getpid()} on {socket.gethostname()}"
+
+
+def asked(digests: object) -> str:
+    """Return the line that tells what the job was asked."""
+    return f"asked: {digests}"
 
 
 def tenth(fraction: float) -> str:
@@ -95,12 +103,14 @@ def read(path: Path) -> Told | None:
     except OSError:
         return None
     first = _BEGUN.search(text)
+    asked = _ASKED.search(text)
     shares, counts = _TENTH.findall(text), _CELLS.findall(text)
     end = _END.search(text)  # a traceback may follow
     return Told(
         begun=_time(first[1]) if first else None,
         process=int(first[2]) if first else 0,
         host=printable(first[3]) if first else "",
+        asked=asked[1] if asked else "",
         progress=min(int(shares[-1]) / 100, 1.0) if shares else 0.0,
         cells=int(counts[-1]) if counts else None,
         ending=(end[1] or end[3]) if end else "",

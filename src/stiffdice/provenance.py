@@ -38,6 +38,7 @@ def _closure(paths: list[Path | None]) -> set[Path]:
     return found
 
 
+@cache
 def _imports(path: Path) -> set[str]:
     """Return the dotted names that a source file imports from this package, function-level imports included."""
     names: set[str] = set()

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from stiffdice import shards
-from stiffdice.study import Study
+from stiffdice.catalogue import DRAWINGS, TABLES
+from stiffdice.shards import Shard
+from stiffdice.study import PlannedFigure, Study
 
 
 class Result(NamedTuple):
@@ -33,10 +35,18 @@ class Result(NamedTuple):
 
 def of(study: Study) -> list[Result]:
     """Return the results of a study, in the order in which one stands on another."""
-    return [*_made(study), *_shown(study)]
+    return _every(study, _plans(study))
 
 
-def _made(study: Study) -> Iterator[Result]:
+def _plans(study: Study) -> dict[str, dict[str, Shard]]:
+    return {name: shards.of(sweep) for name, sweep in study.sweeps.items()}
+
+
+def _every(study: Study, plans: dict[str, dict[str, Shard]]) -> list[Result]:
+    return [*_made(study, plans), *_shown(study)]
+
+
+def _made(study: Study, plans: dict[str, dict[str, Shard]]) -> Iterator[Result]:
     for name, run in study.runs.items():
         for preset in run.presets:
             yield Result("trajectory", f"{name}.{preset}", (f"runs/{name}.{preset}.h5",))
@@ -46,7 +56,7 @@ def _made(study: Study) -> Iterator[Result]:
         yield Result("timings", name, (f"benchmarks/timings/{name}.h5",))
     for name, sweep in study.sweeps.items():
         top = f"sweeps/{name}"
-        plan = shards.of(sweep)
+        plan = plans[name]
         for number in range(sweep.refine + 1):
             for shard in shards.rounds(plan, number):
                 yield Result("shard", f"{name}/{shard}", (f"{top}/shards/{shard}.h5",))
@@ -64,3 +74,56 @@ def _shown(study: Study) -> Iterator[Result]:
             yield Result("figure", name, (f"figures/{name}.svg", f"figures/{name}.png"))
     for name in study.tables:
         yield Result("table", name, (f"tables/{name}.md", f"tables/{name}.csv"))
+
+
+def needs(study: Study) -> dict[Result, tuple[Result, ...]]:
+    """Return for each result of a study those that it is made from."""
+    plans = _plans(study)
+    every = _every(study, plans)
+    named = {(result.stage, result.name): result for result in every}
+
+    def collected(sweep: str, rounds: int) -> Iterator[tuple[str, str]]:
+        """Yield the stages and names of what the first so many rounds are judged from."""
+        for shard, plan in plans[sweep].items():
+            if plan.round < rounds:
+                yield "shard", f"{sweep}/{shard}"
+        for number in range(rounds - 1):
+            yield "survey", f"{sweep}/{number}"
+
+    def keys(result: Result) -> Iterator[tuple[str, str]]:
+        """Yield the stages and names of what a result is made from."""
+        sweep, _, name = result.name.partition("/")
+        match result.stage:
+            case "shard":
+                before = plans[sweep][name].round
+                if before:
+                    yield "survey", f"{sweep}/{before - 1}"
+            case "survey":
+                yield from collected(sweep, int(name) + 1)
+            case "collect":
+                yield from collected(sweep, study.sweeps[sweep].refine + 1)
+            case "frontier":
+                yield "collect", sweep
+            case "figure" | "animation":
+                planned = study.figures[result.name]
+                yield from _shown_by(study, planned, DRAWINGS[planned.draw].given)
+            case "table":
+                planned = study.tables[result.name]
+                yield from _shown_by(study, planned, TABLES[planned.draw].given)
+
+    return {result: tuple(named[key] for key in keys(result)) for result in every}
+
+
+# The stage whose results a figure or a table shows, by what it is given.
+_SHOWN = {"sweeps": "frontier", "experiments": "experiment", "timings": "timings"}
+
+
+def _shown_by(study: Study, planned: PlannedFigure, given: str) -> Iterator[tuple[str, str]]:
+    """Yield the stages and names of what a figure or a table shows."""
+    if planned.run is not None:
+        for preset in study.runs[planned.run].presets:
+            yield "trajectory", f"{planned.run}.{preset}"
+    for name in planned.of:
+        yield _SHOWN[given], name
+    for name in planned.timings:
+        yield "timings", name

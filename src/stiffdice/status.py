@@ -1,12 +1,12 @@
 """How far a study is: which of its results are done, which failed and why, and what is left to do.
 
 Told from the files under results/STUDY and from the jobs' logs alone, without opening a result: quick, and safe while
-jobs are at work. Whether a result should be made again because something else has changed is Snakemake's to say.
+jobs are at work. What was asked of a result when it was made, its log says (`asked`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -14,12 +14,11 @@ from pathlib import Path
 from stat import S_ISREG
 from typing import NamedTuple
 
-from stiffdice import disk_use, job_log, results, shards, time_left
-from stiffdice.catalogue import DRAWINGS, TABLES
+from stiffdice import asked, disk_use, job_log, results, shards, time_left
 from stiffdice.grid import Sweep
 from stiffdice.results import Result
 from stiffdice.shards import Shard
-from stiffdice.study import PlannedFigure, Study
+from stiffdice.study import Study
 
 
 class State(StrEnum):
@@ -27,12 +26,13 @@ class State(StrEnum):
 
     DONE: its files are there, whole, and so is all that it stands on. RUNNING: its job has begun, and has not ended.
     INTERRUPTED: its job was told to stop, or ended without a word. FAILED: its job ended by an error. WAITING: its job
-    has not begun.
+    has not begun. STALE: its files are there, but something else was asked when they were made.
     """
 
     DONE = "done"
     RUNNING = "running"
     INTERRUPTED = "interrupted"
+    STALE = "stale"
     FAILED = "failed"
     WAITING = "waiting"
 
@@ -40,9 +40,9 @@ class State(StrEnum):
 class Standing(NamedTuple):
     """One result, and how it stands with it.
 
-    reason: why it failed or was interrupted; of one that runs, what is not known. begun: when its job did (UTC).
-    progress: fraction of a running job that is done, as of `told` (UTC). cells: in a shard that is done, if its log
-    says.
+    reason: why it failed or was interrupted, or what is other in what was asked of a stale one; of one that runs, what
+    is not known. begun: when its job did (UTC). progress: fraction of a running job that is done, as of `told` (UTC).
+    cells: in a shard that is done, if its log says.
     """
 
     result: Result
@@ -88,21 +88,23 @@ class Status:
     def state(self) -> State:
         """The study's: failed if any result is, running if any job is, done if all are."""
         found = {standing.state for standing in self.standings}
-        for state in (State.FAILED, State.RUNNING, State.INTERRUPTED, State.WAITING):
+        for state in (State.FAILED, State.RUNNING, State.INTERRUPTED, State.STALE, State.WAITING):
             if state in found:
                 return state
         return State.DONE
 
     @property
     def ready(self) -> list[Standing]:
-        """Results whose job has not begun, though all that they stand on is done."""
-        done, below = {standing.result for standing in self.those(State.DONE)}, needs(self.study)
-        return [standing for standing in self.those(State.WAITING) if done.issuperset(below[standing.result])]
+        """Results that wait or are stale, though all that they stand on is done."""
+        done, below = {standing.result for standing in self.those(State.DONE)}, results.needs(self.study)
+        return [
+            standing for standing in self.those(State.WAITING, State.STALE) if done.issuperset(below[standing.result])
+        ]
 
     @property
     def stuck(self) -> list[Standing]:
         """Results that are not made because something that they stand on failed or was interrupted."""
-        return _stuck(self.standings, needs(self.study))
+        return _stuck(self.standings, results.needs(self.study))
 
 
 def _stuck(standings: Iterable[Standing], below: Mapping[Result, tuple[Result, ...]]) -> list[Standing]:
@@ -117,14 +119,17 @@ def _stuck(standings: Iterable[Standing], below: Mapping[Result, tuple[Result, .
 
 
 def of(study: Study, folder: Path, cores: int | None = None) -> Status:
-    """Return how far a study is.
+    """Return how far a study is; to be called in the project's folder.
 
     folder: results/STUDY, there or not. cores: for the time left; by default as many as jobs are running.
     """
-    below, standings, plans = needs(study), dict[Result, Standing](), _plans(study)
-    for result in results.of(study):
+    below, standings, plans = results.needs(study), dict[Result, Standing](), _plans(study)
+    stale = asked.stale(asked.of(study), folder)
+    for result in below:
         standing = _alone(result, folder)
-        if standing.state is State.DONE and any(standings[part].state is not State.DONE for part in below[result]):
+        if standing.state is State.DONE and result in stale:
+            standing = Standing(result, State.STALE, stale[result])
+        elif standing.state is State.DONE and any(standings[part].state is not State.DONE for part in below[result]):
             standing = Standing(result, State.WAITING)  # its files are there, and will be made again
         standings[result] = standing
     every = tuple(standings.values())
@@ -145,59 +150,6 @@ def _plans(study: Study) -> dict[str, dict[str, Shard]]:
         name: {f"{name}/{shard}": plan for shard, plan in shards.of(sweep).items()}
         for name, sweep in study.sweeps.items()
     }
-
-
-def needs(study: Study) -> dict[Result, tuple[Result, ...]]:
-    """Return for each result of a study those that it is made from."""
-    every = results.of(study)
-    named = {(result.stage, result.name): result for result in every}
-    plans = _plans(study)
-
-    def collected(sweep: str, rounds: int) -> Iterator[tuple[str, str]]:
-        """Yield the stages and names of what the first so many rounds are judged from."""
-        for shard, plan in plans[sweep].items():
-            if plan.round < rounds:
-                yield "shard", shard
-        for number in range(rounds - 1):
-            yield "survey", f"{sweep}/{number}"
-
-    def keys(result: Result) -> Iterator[tuple[str, str]]:
-        """Yield the stages and names of what a result is made from."""
-        sweep, _, number = result.name.partition("/")
-        match result.stage:
-            case "shard":
-                before = plans[sweep][result.name].round
-                if before:
-                    yield "survey", f"{sweep}/{before - 1}"
-            case "survey":
-                yield from collected(sweep, int(number) + 1)
-            case "collect":
-                yield from collected(sweep, study.sweeps[sweep].refine + 1)
-            case "frontier":
-                yield "collect", sweep
-            case "figure" | "animation":
-                planned = study.figures[result.name]
-                yield from _shown_by(study, planned, DRAWINGS[planned.draw].given)
-            case "table":
-                planned = study.tables[result.name]
-                yield from _shown_by(study, planned, TABLES[planned.draw].given)
-
-    return {result: tuple(named[key] for key in keys(result)) for result in every}
-
-
-# The stage whose results a figure or a table shows, by what it is given.
-_SHOWN = {"sweeps": "frontier", "experiments": "experiment", "timings": "timings"}
-
-
-def _shown_by(study: Study, planned: PlannedFigure, given: str) -> Iterator[tuple[str, str]]:
-    """Yield the stages and names of what a figure or a table shows."""
-    if planned.run is not None:
-        for preset in study.runs[planned.run].presets:
-            yield "trajectory", f"{planned.run}.{preset}"
-    for name in planned.of:
-        yield _SHOWN[given], name
-    for name in planned.timings:
-        yield "timings", name
 
 
 def _alone(result: Result, folder: Path) -> Standing:

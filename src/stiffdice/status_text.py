@@ -33,6 +33,11 @@ def as_text(status: Status) -> str:
     lines += ["", *_stages(status)]
     for state in (State.RUNNING, State.INTERRUPTED, State.FAILED):
         lines += _listed(status, state)
+    stale = status.those(State.STALE)
+    if stale:
+        lines += ["", "stale: the same command makes again"]
+    for reason in dict.fromkeys(standing.reason for standing in stale):
+        lines.append(f"  {_names([standing for standing in stale if standing.reason == reason])}  {reason}")
     if status.stuck:
         lines += ["", f"not made because of that: {_names(status.stuck)}"]
     lines += ["", *_disk(status.use, sum(cells.runs for cells in status.cells.values()))]

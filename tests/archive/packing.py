@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 from tests import rounds
 
-from stiffdice import figures, frontier, results, shards, study, sweep
+from stiffdice import asked, figures, frontier, job_log, results, shards, study, sweep
 from stiffdice import scene as scenes
 from stiffdice.catalogue import TABLES
 from stiffdice.io.layout import run_dataset
@@ -72,11 +72,11 @@ def plan(folder: Path) -> study.Study:
 
 def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
     """Make all results of the study in a project, with logs and benchmarks of jobs that ended then [s since 1970]."""
-    top = folder / "results/tiny"
+    top, asks = folder / "results/tiny", asked.of(planned, folder)
     for result in results.of(planned):
         for name in (*result.files, result.log, result.benchmark):
             (top / name).parent.mkdir(parents=True, exist_ok=True)
-        (top / result.log).write_text(f"done at {ended}\n")
+        (top / result.log).write_text(f"{job_log.asked(asks[result])}\ndone at {ended}\n")
         (top / result.benchmark).write_text(f"s\th:m:s\n12.5\t{ended}\n")
         os.utime(top / result.benchmark, (ended, ended))
         first = top / result.files[0]
@@ -85,8 +85,8 @@ def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
             given = scenes.load(folder / run.scene, preset="as_listed")
             write_dataset(run_dataset(simulate(given, model=run.model, steps=run.steps, every=run.every)), first)
         elif result.stage == "shard":
-            asked = planned.sweeps["steps"]
-            sweep.compute(asked, shards.of(asked)[first.stem].pieces, first)
+            grid = planned.sweeps["steps"]
+            sweep.compute(grid, shards.of(grid)[first.stem].pieces, first)
         elif result.stage == "collect":
             runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path))
             write_dataset(sweep.collect(runs, planned.sweeps["steps"].criteria), first)

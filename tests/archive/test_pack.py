@@ -133,6 +133,16 @@ def test_what_deflating_makes_no_shorter_is_stored(packed):
         assert archive.getinfo("requirements/requirements.lock").compress_type == zipfile.ZIP_DEFLATED
 
 
+def test_a_stale_result_is_told(own, tmp_path):
+    folder, planned = own
+    scene = folder / "config/scenes/figure-09.yaml"
+    scene.write_text(scene.read_text().replace("damping: 0.2", "damping: 0.3"))
+    told = "results/tiny/runs/fall.as_listed.h5: made from other scene, as 2 of [0-9]+ results of this study"
+    with pytest.raises(InputError, match=told):
+        pack(planned, folder, tmp_path / "x.zip")
+    assert not list(tmp_path.glob("*.zip"))
+
+
 def test_a_missing_result_is_told(own, tmp_path):
     folder, planned = own
     for path in (folder / "results/tiny/figures").iterdir():

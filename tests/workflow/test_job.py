@@ -18,7 +18,7 @@ SCRIPTS = Path(__file__).parents[2] / "workflow" / "scripts"
 BEFORE = f"""
 import sys, types
 sys.path.insert(0, {str(SCRIPTS)!r})
-snakemake = types.SimpleNamespace(log=sys.argv[1:])
+snakemake = types.SimpleNamespace(log=sys.argv[1:], params=types.SimpleNamespace(asked="scene 0"))
 from job import logged
 """
 IN_BLOCK = "with logged() as say:\n    "
@@ -36,8 +36,9 @@ def test_a_job_that_does_what_it_should(tmp_path):
     log = tmp_path / "log"
     ended = run(IN_BLOCK + "say('simulation: 1.000 s')", log=log)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
-    first, said, last = log.read_text().splitlines()
+    first, asked, said, last = log.read_text().splitlines()
     assert first.startswith("begun 20")
+    assert asked == "asked: scene 0"
     assert said == "simulation: 1.000 s"
     assert last.startswith("done in ")
     assert job_log.read(log).ending == "done"
@@ -120,7 +121,7 @@ def test_progress_is_told_by_tenths(tmp_path):
         "    for k in range(1000): tell((k + 1) / 1000)",
         log=log,
     )
-    assert log.read_text().splitlines()[1:-1] == [f"{k}0% of the steps done" for k in range(1, 11)]
+    assert log.read_text().splitlines()[2:-1] == [f"{k}0% of the steps done" for k in range(1, 11)]
     assert job_log.read(log).progress == 1
 
 
@@ -128,4 +129,4 @@ def test_a_process_of_its_own_is_named(tmp_path):
     log = tmp_path / "log"
     ended = run("import os", IN_BLOCK + "say(str(os.getpid()))", log=log)
     assert ended.returncode == 0
-    assert str(job_log.read(log).process) == log.read_text().splitlines()[1] != str(os.getpid())
+    assert str(job_log.read(log).process) == log.read_text().splitlines()[2] != str(os.getpid())

@@ -1,17 +1,15 @@
 # What the rules share: studies, read and checked once, and the paths that follow from them.
 
-import hashlib
 import math
 import sys
 import time
 from functools import cache
 from pathlib import Path
 
-from stiffdice import results, runners, shards, simulators
+from stiffdice import asked, results, shards
 from stiffdice import study as studies
-from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
+from stiffdice.catalogue import DRAWINGS, TABLES
 from stiffdice.errors import InputError
-from stiffdice.provenance import code_digest
 
 SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 BEGUN = time.time()
@@ -33,30 +31,6 @@ wildcard_constraints:
     table="[a-z0-9][a-z0-9-]*",
 
 
-def code_of(script, *modules):
-    """Return a digest of a script and of the library modules it stands on.
-
-    Snakemake's own code trigger goes by the time a script was changed, which a checkout changes, too; and it does not
-    see the library. The profile turns it off.
-    """
-    digest = hashlib.sha256(code_digest(*modules).encode())
-    for name in (script, "job.py", "inputs.py"):
-        digest.update((Path(workflow.basedir) / "workflow" / "scripts" / name).read_bytes())
-    return digest.hexdigest()
-
-
-def code_of_runs(script, simulator, *modules):
-    """Return the digest of `code_of` for runs that a simulator makes; of an engine, its version counts, too."""
-    code = code_of(script, *modules, *simulators.code_of(simulator))
-    return code if simulator == simulators.OURS else f"{code} {simulators.version_of(simulator)}"
-
-
-def code_of_measuring(planned, registry):
-    """Return the digest of what an experiment or timing depends on, and the versions of the engines that it asks."""
-    code = code_of("measure.py", registry[planned.measure].module, "stiffdice.io.layout", "stiffdice.io.write")
-    return " ".join([code, *runners.attributes(planned.options.get("methods", ())).values()])
-
-
 @cache
 def study(name):
     """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
@@ -65,6 +39,41 @@ def study(name):
     except InputError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+@cache
+def asked_by(name):
+    return asked.of(study(name))
+
+
+@cache
+def parameters_by(name):
+    return {(result.stage, result.name): str(digests) for result, digests in asked_by(name).items()}
+
+
+def asked_of(stage, name):
+    """Return a parameter: digests of all that a result follows from; name: its own in the stage, with wildcards.
+
+    It takes the place of Snakemake's own code trigger, which goes by the time a script was changed, as a checkout
+    changes it, and does not see the library. The profile turns that off.
+    """
+    return lambda wildcards: parameters_by(wildcards.study)[stage, name.format(**dict(wildcards.items()))]
+
+
+@cache
+def stale_files(name):
+    top = Path("results", name)
+    return [f"{top}/{file}" for result in asked.stale(asked_by(name), top) for file in result.files]
+
+
+def not_stale(wildcards):
+    """Return no file, as input of every rule; results that something else was asked of are made again.
+
+    Snakemake sees by itself what has changed since it last made a result, but not if its notes are lost.
+    """
+    if workflow.is_main_process:
+        workflow.dag.forcefiles.update(stale_files(wildcards.study))
+    return []
 
 
 def planned_run(wildcards):
@@ -99,11 +108,6 @@ def shards_of(name, sweep):
 
 def shard_of(wildcards):
     return shards_of(wildcards.study, wildcards.sweep)[wildcards.shard]
-
-
-def placing(shard):
-    """Return the modules that say which cells a shard has, if its name does not: those of a later round."""
-    return ["stiffdice.shards"] if shard.round else []
 
 
 def minutes_of(shard):
@@ -151,16 +155,6 @@ def data_of_figure(wildcards):
 def data_of_table(wildcards):
     planned = planned_table(wildcards)
     return found_by(wildcards.study, planned, TABLES[planned.draw].given)
-
-
-def drawing_code(planned):
-    """Return the digest of what a figure depends on: the one module that draws it, and what that imports."""
-    return code_of("figure.py", DRAWINGS[planned.draw].module, "stiffdice.figures", "stiffdice.io.read")
-
-
-def telling_code(planned):
-    """Return the digest of what a table depends on."""
-    return code_of("table.py", TABLES[planned.draw].module, "stiffdice.io.read", "stiffdice.io.write")
 
 
 def growing(amount):

@@ -3,12 +3,12 @@
 
 rule experiment:
     input:
-        scene=lambda wildcards: planned_experiment(wildcards).scene,
+        not_stale,
     output:
         "results/{study}/experiments/{experiment}.h5",
     params:
         experiment=lambda wildcards: planned_experiment(wildcards),
-        code=lambda wildcards: code_of_measuring(planned_experiment(wildcards), EXPERIMENTS),
+        asked=asked_of("experiment", "{experiment}"),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
     benchmark:
@@ -27,12 +27,12 @@ rule experiment:
 # the profile for a node of its own.
 rule timing:
     input:
-        scene=lambda wildcards: planned_timing(wildcards).scene,
+        not_stale,
     output:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
         experiment=lambda wildcards: planned_timing(wildcards),
-        code=lambda wildcards: code_of_measuring(planned_timing(wildcards), TIMINGS),
+        asked=asked_of("timings", "{timing}"),
     log:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:

@@ -3,6 +3,7 @@
 
 rule figure:
     input:
+        not_stale,
         unpack(data_of_figure),
     output:
         report(
@@ -15,7 +16,7 @@ rule figure:
     params:
         figure=lambda wildcards: planned_figure(wildcards),
         dpi=lambda wildcards: study(wildcards.study).dpi,
-        code=lambda wildcards: drawing_code(planned_figure(wildcards)),
+        asked=asked_of("figure", "{figure}"),
     log:
         "results/{study}/logs/figure/{figure}.log",
     benchmark:
@@ -40,7 +41,7 @@ use rule figure as animation with:
     params:
         figure=lambda wildcards: planned_figure(wildcards),
         dpi=80,  # for screens, whatever the study asks of its PNG files
-        code=lambda wildcards: drawing_code(planned_figure(wildcards)),
+        asked=asked_of("animation", "{figure}"),
     log:
         "results/{study}/logs/animation/{figure}.log",
     benchmark:
@@ -49,6 +50,7 @@ use rule figure as animation with:
 
 rule table:
     input:
+        not_stale,
         unpack(data_of_table),
     output:
         markdown=report(
@@ -60,7 +62,7 @@ rule table:
         csv="results/{study}/tables/{table}.csv",
     params:
         table=lambda wildcards: planned_table(wildcards),
-        code=lambda wildcards: telling_code(planned_table(wildcards)),
+        asked=asked_of("table", "{table}"),
     log:
         "results/{study}/logs/table/{table}.log",
     benchmark:

@@ -3,18 +3,12 @@
 
 rule trajectory:
     input:
-        scene=lambda wildcards: planned_run(wildcards).scene,
+        not_stale,
     output:
         "results/{study}/runs/{run}.{preset}.h5",
     params:
         run=lambda wildcards: planned_run(wildcards),
-        code=lambda wildcards: code_of_runs(
-            "trajectory.py",
-            planned_run(wildcards).simulator,
-            "stiffdice.io.layout",
-            "stiffdice.ledger",
-            "stiffdice.io.write",
-        ),
+        asked=asked_of("trajectory", "{run}.{preset}"),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",
     benchmark:

@@ -5,14 +5,13 @@
 # there: one that is made once more says the same.
 rule shard:
     input:
+        not_stale,
         survey=lambda wildcards: ancient(survey_files(wildcards, shard_of(wildcards).round + 1)[-1:]),
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; the name says what changed
-        code=lambda wildcards: code_of_runs(
-            "shard.py", planned_sweep(wildcards).simulator, "stiffdice.sweep", *placing(shard_of(wildcards))
-        ),
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        asked=asked_of("shard", "{sweep}/{shard}"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
     benchmark:
@@ -30,14 +29,14 @@ rule shard:
 # What the rounds up to one of them found, from which the next one's cells follow.
 rule survey:
     input:
+        not_stale,
         shards=lambda wildcards: shard_files(wildcards, int(wildcards.round) + 1),
         surveys=lambda wildcards: survey_files(wildcards, int(wildcards.round) + 1),
     output:
         sweep="results/{study}/sweeps/{sweep}/surveys/{round}.h5",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared
-        tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
-        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.shards", "stiffdice.io.read", "stiffdice.io.write"),
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        asked=asked_of("survey", "{sweep}/{round}"),
     log:
         "results/{study}/logs/survey/{sweep}/{round}.log",
     benchmark:
@@ -54,15 +53,15 @@ rule survey:
 
 rule collect:
     input:
+        not_stale,
         shards=lambda wildcards: shard_files(wildcards, planned_sweep(wildcards).refine + 1),
         surveys=lambda wildcards: survey_files(wildcards, planned_sweep(wildcards).refine + 1),
     output:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared
-        tolerances=lambda wildcards: dict(planned_sweep(wildcards).criteria),
-        code=code_of("collect.py", "stiffdice.sweep", "stiffdice.shards", "stiffdice.io.read", "stiffdice.io.write"),
+        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        asked=asked_of("collect", "{sweep}"),
     log:
         "results/{study}/logs/collect/{sweep}.log",
     benchmark:
@@ -79,6 +78,7 @@ rule collect:
 
 rule frontier:
     input:
+        not_stale,
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
     output:
         data="results/{study}/sweeps/{sweep}/frontier.h5",
@@ -89,7 +89,7 @@ rule frontier:
             labels={"what": "{sweep}: the numbers behind the frontier"},
         ),
     params:
-        code=code_of("frontier.py", "stiffdice.frontier", "stiffdice.io.read", "stiffdice.io.write"),
+        asked=asked_of("frontier", "{sweep}"),
     log:
         "results/{study}/logs/frontier/{sweep}.log",
     benchmark:

@@ -14,6 +14,7 @@ from stiffdice.io.write import write_bytes, write_dataset
 
 snakemake: Any  # Snakemake puts it here
 
+asked = snakemake.params.sweep
 lines = ["shard,round,cells,members,stiffness_from_kg_s-2,stiffness_to_kg_s-2,steps_from,steps_to"]
 
 
@@ -26,7 +27,6 @@ def row(name: str, number: int, members: int, stiffness: list[float], steps: lis
 
 def checked(say: Say) -> Iterator[xr.Dataset]:
     """Read one shard after another, part by part, and note what is in it; one that is not as planned is refused."""
-    asked = snakemake.params.sweep
     plan, inputs = shards.of(asked), Inputs(say)
     surveys = opened(((Path(path).stem, path) for path in snakemake.input.surveys), say)
     later = {
@@ -48,7 +48,7 @@ def checked(say: Say) -> Iterator[xr.Dataset]:
 
 
 with logged() as say:
-    found = sweep.collect(checked(say), snakemake.params.tolerances, snakemake.params.sweep.config)
+    found = sweep.collect(checked(say), asked.criteria, asked.config)
     write_dataset(found, snakemake.output.sweep)
     if snakemake.rule == "collect":
         write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)

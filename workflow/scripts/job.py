@@ -39,6 +39,7 @@ class _Log:
         except OSError as error:
             sys.exit(f"stiffdice: {path}: {error.strerror}")
         self.say(job_log.begun())
+        self.say(job_log.asked(sys.modules["__main__"].snakemake.params.asked))
         sys.excepthook = lambda kind, error, trace: self.end(error)
         signal.signal(signal.SIGTERM, _stop)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiffdice import results
+from stiffdice import asked, results
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import FORMAT_VERSION, yaml_file
 from stiffdice.io.read import open_file
@@ -65,7 +65,7 @@ class Found(NamedTuple):
 def of(study: Study, root: Path) -> list[File]:
     """Return the files of an archive of a study, sorted by their paths.
 
-    root: the project's folder. Raises InputError naming the first file that is missing or cannot be packed.
+    root: the project's folder. Raises InputError naming the first file that is missing, stale or cannot be packed.
     """
     files = [*_project(root), *_config(study.name, root), *_results(study, root)]
     by_path: dict[str, File] = {}
@@ -182,6 +182,13 @@ def _results(study: Study, root: Path) -> Iterator[File]:
         raise InputError(
             f"{missing[0]}: not there, as {len(missing)} of {len(planned)} files of this study; "
             f"make study STUDY={study.name} makes what is missing"
+        )
+    stale = asked.stale(asked.of(study, root), root / top)
+    if stale:
+        first, reason = next(iter(stale.items()))
+        raise InputError(
+            f"{top}/{first.files[0]}: {reason}, as {len(stale)} of {len(results.of(study))} results of this study; "
+            f"make study STUDY={study.name} makes them again"
         )
     for path, result in planned:
         yield File(path, _kind(path, result), root / path, result)

@@ -15,7 +15,8 @@ from urllib.parse import unquote
 
 import xarray as xr
 
-from stiffdice import sanity, sweep
+from stiffdice import asked, sanity, sweep
+from stiffdice import study as studies
 from stiffdice.archive import manifest
 from stiffdice.archive.report import Report
 from stiffdice.archive.unzip import unzip
@@ -29,6 +30,7 @@ CRATE = "ro-crate-metadata.json"
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _LARGEST_TEXT = 200_000_000  # bytes of a manifest or a crate's description
+_SCHEMA = Path("workflow/schemas/study.schema.yaml")
 _SHARD = re.compile("[0-9a-f]{12}")
 
 Tell = Callable[[float], None]
@@ -102,6 +104,7 @@ class _Folder:
             self._check_crate(digests)
         else:
             report.note(f"digests (there is no {manifest.NAME})")
+            self._check_asked()
         files, done = _Files(report, self._teller(data, 0.5 if self._is_archive else 0, 1)), set()
         files.try_apart(data)
         for folder in sorted(
@@ -149,6 +152,20 @@ class _Folder:
             return path.read_text(encoding="utf-8")
         except UnicodeDecodeError:
             raise RefusedError("not a text file (UTF-8)") from None
+
+    def _check_asked(self) -> None:
+        """Check a study's results against what it asks now, in the project's folder."""
+        name = self._folder.resolve().name
+        if not _SCHEMA.is_file() or self._folder.resolve() != Path("results", name).resolve():
+            self.report.note("whether a study asks for these results, as this is not its project's folder")
+            return
+        try:
+            stale = asked.stale(asked.of(studies.load(f"config/{name}.yaml", _SCHEMA)), self._folder)
+        except InputError as error:
+            self.report.note(f"whether a study asks for these results ({error})")
+            return
+        for result, reason in stale.items():
+            self.report.fail(result.files[0], f"stale: {reason}")
 
     def _check_manifest(self, digests: Mapping[str, str]) -> None:
         report = self.report

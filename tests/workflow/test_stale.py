@@ -1,0 +1,196 @@
+"""Results follow from what is asked now, whatever the times of files say, and whatever Snakemake has forgotten."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from tests.workflow.test_workflow import TINY, Project
+
+pytestmark = pytest.mark.workflow
+# One of each kind: a survey needs a refined sweep, an animation a cube that turns.
+STUDY = {
+    **TINY,
+    "runs": {
+        **TINY["runs"],
+        "turn": {
+            "scene": "config/scenes/figure-01.yaml",
+            "presets": ["as_listed"],
+            "model": "tumbling",
+            "steps": 20000,
+            "every": 2000,
+        },
+    },
+    "sweeps": {"steps": {**TINY["sweeps"]["steps"], "refine": 1}},
+    "experiments": {"books": TINY["experiments"]["books"]},
+    "figures": {
+        "position": TINY["figures"]["position"],
+        "frontier": TINY["figures"]["frontier"],
+        "movie": {"draw": "animation", "run": "turn", "title": "Movie"},
+        "books": TINY["figures"]["books"],
+    },
+}
+SWEPT = {"shard": 3, "survey": 1, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A project whose study has run."""
+    project = Project(tmp_path_factory.mktemp("stale"))
+    project.plan(STUDY)
+    done = project.snakemake()
+    assert done.returncode == 0, done.stderr
+    return project
+
+
+@pytest.fixture
+def copied(finished, tmp_path):
+    """A copy for one test, as `cp -a` makes it."""
+    shutil.copytree(finished.folder, tmp_path / "project", symlinks=True)
+    project = object.__new__(Project)
+    project.folder = tmp_path / "project"
+    return project
+
+
+def forget(project):
+    shutil.rmtree(project.folder / ".snakemake")
+
+
+def change(project, name, before, after):
+    """Change a file, and keep its time: an older one is put in its place."""
+    path = project.folder / "config" / name
+    text, stat = path.read_text(), path.stat()
+    assert before in text
+    path.write_text(text.replace(before, after))
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+
+
+def stiffdice(project, *arguments):
+    command = [sys.executable, "-m", "stiffdice", *arguments]
+    return subprocess.run(
+        command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
+    )
+
+
+def replaced_by_mv(old, new):
+    os.utime(new, (time.time() - 3600,) * 2)
+    new.rename(old)
+
+
+def replaced_by_cp(old, new):
+    os.utime(new, (time.time() - 3600,) * 2)
+    shutil.copy2(new, old)
+
+
+def replaced_by_tar(old, new):
+    shutil.copystat(old, new)
+    subprocess.run(["tar", "cf", "x.tar", new.name], cwd=new.parent, check=True)
+    subprocess.run(["tar", "xf", "x.tar", "-C", old.parent], cwd=new.parent, check=True)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "scene", "due"),
+    [
+        (replaced_by_mv, "figure-09", {"trajectory": 2, "experiment": 1, "figure": 2}),
+        (replaced_by_cp, "figure-01", {"trajectory": 1, "timing": 1, "animation": 1}),
+        (replaced_by_tar, "figure-13", SWEPT),
+    ],
+)
+@pytest.mark.long
+def test_an_older_scene_is_run(copied, tmp_path, replaced, scene, due):
+    old, new = copied.folder / f"config/scenes/{scene}.yaml", tmp_path / f"{scene}.yaml"
+    new.write_text(re.sub("damping: [0-9.]+", "damping: 0.3", old.read_text()))
+    assert new.read_text() != old.read_text()
+    replaced(old, new)
+    assert copied.jobs_due() == due
+    forget(copied)
+    assert copied.jobs_due() == due
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "due"),
+    [
+        ("steps: 10000", "steps: 20000", {"trajectory": 2, "figure": 1}),
+        ("every: 2000", "every: 1000", {"trajectory": 1, "animation": 1}),
+        ("- 20000", "- 30000", {"experiment": 1, "figure": 1}),
+        ("rounds: 1", "rounds: 2", {"timing": 1}),
+        ("members: 4", "members: 5", SWEPT),
+        ("early_stop: false", "early_stop: false\n    criteria: {energy: 0.2}", SWEPT | {"shard": 1}),
+        ("title: Position", "title: Place", {"figure": 1}),
+        ("title: Movie", "title: Film", {"animation": 1}),
+        ("title: Answers", "title: Replies", {"table": 1}),
+        ("question:", "dpi: 60\nquestion:", {"figure": 3, "animation": 1}),
+    ],
+)
+@pytest.mark.long
+def test_another_study_is_run_though_snakemake_forgot(copied, before, after, due):
+    change(copied, "tiny.yaml", before, after)
+    forget(copied)
+    assert copied.jobs_due() == due
+
+
+def test_the_same_study_is_not_run_though_snakemake_forgot(copied):
+    forget(copied)
+    for path in (copied.folder / "config").rglob("*.yaml"):
+        path.touch()
+    assert copied.jobs_due() == {}
+    done = stiffdice(copied, "status", "tiny")
+    assert done.returncode == 0, done.stdout
+    assert stiffdice(copied, "verify", "results/tiny").returncode == 0
+
+
+def test_what_is_asked_for_by_name_is_made_again_and_no_more(copied):
+    change(copied, "tiny.yaml", "title: Position", "title: Place")
+    change(copied, "tiny.yaml", "title: Books", "title: Ledger")
+    forget(copied)
+    command = [sys.executable, "-m", "snakemake", "-n", "results/tiny/figures/books.svg"]
+    done = subprocess.run(
+        command, cwd=copied.folder, env=copied.environment, capture_output=True, text=True, check=True
+    )
+    assert re.search(r"^figure +1\ntotal +1$", done.stdout + done.stderr, re.MULTILINE)
+
+
+def test_what_is_stale_is_told_refused_and_made_again(copied):
+    """And is as a study that was asked this from the start."""
+    change(copied, "scenes/figure-09.yaml", "damping: 0.2", "damping: 0.3")
+    forget(copied)
+    run = "results/tiny/runs/stiff.as_listed.h5"
+    told = stiffdice(copied, "status", "tiny")
+    assert told.returncode == 3
+    assert (
+        "trajectory stiff.as_listed, trajectory stiff.as_written, experiment books  made from other scene"
+        in told.stdout
+    )
+    assert "figure books, figure position  made from other inputs" in told.stdout
+    told = stiffdice(copied, "verify", "results/tiny")
+    assert told.returncode == 1
+    assert "runs/stiff.as_listed.h5: stale: made from other scene" in told.stdout
+    for name in ("CHANGELOG.md", "CITATION.cff", "LICENSE", "Makefile", "README.md", "pyproject.toml"):
+        shutil.copy(Path(__file__).parents[2] / name, copied.folder)
+    for name in ("requirements", "docs"):
+        (copied.folder / name).mkdir()
+    (copied.folder / "results/README.md").touch()
+    told = stiffdice(copied, "archive", "tiny")
+    assert (told.returncode, told.stderr.count("\n")) == (2, 1)
+    assert f"{run}: made from other scene, as 5 of " in told.stderr
+    before = copied.results("runs/stiff*.h5", "experiments/*", "figures/position.svg", "figures/books.svg")
+    others = copied.results("runs/turn*", "sweeps/**/*.h5", "tables/*", "figures/frontier.*", "benchmarks/timings/*.h5")
+    done = copied.snakemake()
+    assert done.returncode == 0, done.stderr
+    assert all(content != before[name] for name, content in copied.results(*before).items())
+    assert others == copied.results(*others)
+    assert copied.jobs_due() == {}
+    assert stiffdice(copied, "status", "tiny").returncode == 0
+    assert stiffdice(copied, "verify", "results/tiny").returncode == 0
+
+
+def test_a_log_that_is_gone_tells_nothing(copied):
+    (copied.folder / "results/tiny/logs/experiment/books.log").unlink()
+    assert copied.jobs_due() == {"experiment": 1, "figure": 1}
+    assert "experiment books  no log says what it was made from" in stiffdice(copied, "status", "tiny").stdout
