@@ -116,7 +116,7 @@ def test_status_says_so_too(failed):
     said = status(project, "--json")
     assert (said.returncode, said.stderr) == (1, "")
     data = json.loads(said.stdout)
-    assert data["results"] == {"done": 3, "running": 0, "interrupted": 0, "failed": 1, "waiting": 4}
+    assert data["results"] == {"done": 3, "stale": 0, "running": 0, "interrupted": 0, "failed": 1, "waiting": 4}
     assert data["not_made"] == ["collect large", "frontier large", "figure frontier"]
     (reason,) = (job["reason"] for job in data["jobs"] if job["state"] == "failed")
     assert "File too large" in reason

@@ -418,4 +418,4 @@ def test_where_the_time_went_is_told(finished):
     assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
     # Before it, how long it will take, of the four jobs that are due; and at last what to open.
     assert len(re.findall(r"^stiffdice: tiny: 4 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
-    assert done.stdout.splitlines()[-1] == "open first: results/tiny/figures/books.svg (Books)"
+    assert done.stdout.splitlines()[-1] == f"open first: results/tiny/figures/books.svg ({TITLE})"
