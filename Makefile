@@ -4,11 +4,13 @@ PYTHON ?= python3
 VENV := .venv
 # The folder that the link .venv leads to: what has begun goes on there when a new one takes its place.
 BIN = $(or $(realpath $(VENV)),$(VENV))/bin
+# It takes the place of its shell, and ends with make, however that ends.
+RUN = exec $(BIN)/python workflow/run.py --end-with-parent --cores $(CORES)
 CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast test-slurm lint types check lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,25 +22,25 @@ install-engines: install  ## add the engines that are measured beside ours (MuJo
 	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
 
 paper: install  ## rebuild everything the paper shows, into results/paper/
-	@$(BIN)/python workflow/run.py --cores $(CORES) paper
+	@$(RUN) paper
 
 stability: install  ## measure what "stable" means, into results/stability/
-	@$(BIN)/python workflow/run.py --cores $(CORES) stability
+	@$(RUN) stability
 
 extremes: install  ## where and how runs fail at the extremes, into results/extremes/
-	@$(BIN)/python workflow/run.py --cores $(CORES) extremes
+	@$(RUN) extremes
 
 tradeoff: install  ## what accuracy costs by scheme, into results/tradeoff/
-	@$(BIN)/python workflow/run.py --cores $(CORES) tradeoff
+	@$(RUN) tradeoff
 
 elastic: install  ## a dense grid's answer for fewer runs, into results/elastic/
-	@$(BIN)/python workflow/run.py --cores $(CORES) elastic
+	@$(RUN) elastic
 
 peers: install  ## the engines that are installed beside stiffdice, into results/peers/
-	@$(BIN)/python workflow/run.py --cores $(CORES) peers
+	@$(RUN) peers
 
 study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
-	@$(BIN)/python workflow/run.py --cores $(CORES) study --config 'study=$(STUDY)'
+	@$(RUN) study --config 'study=$(STUDY)'
 
 status:  ## how far a study is, what failed and why: make status STUDY=NAME
 	@PYTHON="$(PYTHON)" requirements/install --check
@@ -51,10 +53,10 @@ archive: report  ## run config/NAME.yaml and pack it with all that made it, into
 	@$(BIN)/stiffdice archive '$(STUDY)'
 
 bench: install  ## measure how fast it is, into results/bench/, and compare with the last time
-	@$(BIN)/stiffdice bench
+	@$(BIN)/python -m benchmarks
 
 sweep-million: install  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into results/scale/ (about half an hour)
-	@$(BIN)/python workflow/million.py $(MILLION)
+	@$(BIN)/python -m benchmarks.scale $(MILLION)
 
 test: install  ## run all tests
 	@$(BIN)/python -m pytest
@@ -65,13 +67,20 @@ test-fast: install  ## run the tests but for the broadest
 test-slurm: install  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
 	@tests/slurm/run $(BIN)/python
 
-lint: install  ## check style (ruff) and the workflow (snakemake --lint)
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/snakemake --lint
+MODULES ?= dynamics/linear_theory integrators/linear_stability sweep/partition sweep/stability_limits
+mutants: install  ## break modules in a dozen places each, and tell what their tests do not notice: make mutants MODULES=sweep/grid
+	@$(BIN)/python -m tests.mutation $(MODULES)
+
+lint: install  ## check style (ruff), which package imports which (import-linter), and the workflow (snakemake --lint)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/lint-imports --no-cache && $(BIN)/snakemake --lint
 
 types: install  ## check types (mypy)
 	@$(BIN)/mypy
 
 check: lint types test  ## all of the above
+
+docs: install  ## write docs/api.md from the docstrings of the public names
+	@$(BIN)/python docs/make_api.py
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
 	@for name in build requirements engines; do \

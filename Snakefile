@@ -27,6 +27,8 @@ report: "workflow/report/workflow.rst"
 
 onstart:
     one_at_a_time()
+    clear_way()
+    set_aside_changed()
     ready_for_cluster()
     tell_how_long()
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from stiffdice import study, sweep
-from stiffdice.io.read import parts
-from stiffdice.scene import Scene, from_mapping
+from stiffdice.io.reader import parts
+from stiffdice.scene.scene import Scene, from_mapping
+from stiffdice.study import config as study
+from stiffdice.sweep import sweep
 from tests import rounds
 
 # A shell that runs the tests in the background lets them, and all that they start, ignore Ctrl-C.

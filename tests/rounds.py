@@ -11,9 +11,10 @@ from typing import Any
 import xarray as xr
 import yaml
 
-from stiffdice import shards, study, sweep
-from stiffdice.grid import Column, Piece, Sweep
-from stiffdice.io.read import parts
+from stiffdice.io.reader import parts
+from stiffdice.study import config as study
+from stiffdice.sweep import partition, sweep
+from stiffdice.sweep.grid import Column, Piece, Sweep
 
 ROOT = Path(__file__).parent.parent
 
@@ -32,10 +33,10 @@ def compute(plan: Sweep, folder: Path) -> list[Path]:
     """Compute all shards of all rounds into a folder, and return their files."""
     made: list[Path] = []
     for number in range(plan.refine + 1):
-        due = shards.rounds(shards.of(plan), number)
+        due = partition.rounds(partition.of(plan), number)
         cells = [shard.pieces for shard in due.values()]
         if number:
-            cells = shards.later(plan, judged(plan, made), number, len(due))
+            cells = partition.later(plan, judged(plan, made), number, len(due))
         for name, pieces in zip(due, cells, strict=True):
             made.append(folder / f"{name}.h5")
             sweep.compute(plan, pieces, made[-1])
@@ -54,7 +55,7 @@ def by_columns(plan: Sweep, size: int, folder: Path) -> list[Path]:
 
 def in_parts(plan: Sweep, count: float) -> Sweep:
     """Return the sweep with jobs of such a length that its first round has about so many."""
-    work = math.fsum(shard.seconds for shard in shards.of(plan).values() if not shard.round)
+    work = math.fsum(shard.seconds for shard in partition.of(plan).values() if not shard.round)
     return dataclasses.replace(plan, seconds_per_job=work / count * (1 + 1e-9))
 
 

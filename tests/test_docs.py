@@ -13,20 +13,22 @@ import matplotlib as mpl
 import pytest
 import yaml
 
-from stiffdice import stated
-from stiffdice.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
-from stiffdice.cli import main
-from stiffdice.criteria import CRITERIA
-from stiffdice.peers import ENGINES
-from stiffdice.scene import PRESETS, Scene
-from stiffdice.schemes import SCHEMES
-from stiffdice.simulators import OURS
+from stiffdice.cli.main import main
+from stiffdice.integrators.registry import SCHEMES
+from stiffdice.scene import derived_parameters
+from stiffdice.scene.scene import PRESETS, Scene
+from stiffdice.simulation.backend import OURS
+from stiffdice.simulation.criteria.registry import CRITERIA
+from stiffdice.simulation.engines.registry import ENGINES
+from stiffdice.study.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [
     "README.md",
     "config/README.md",
     "results/README.md",
+    "docs/house.md",
+    "docs/api.md",
     "docs/method.md",
     "docs/advice.md",
     "docs/speed.md",
@@ -63,7 +65,7 @@ def blocks(page: str, language: str) -> list[str]:
 
 def test_a_cube_of_ones_own_is_thrown_as_the_readme_says(tmp_path, monkeypatch):
     (own,) = (block for block in blocks("README.md", "sh") if "my-cube.yaml" in block)
-    command = own.replace("make install\n", "").replace(".venv/bin/stiffdice", f"{sys.executable} -m stiffdice")
+    command = own.replace("make install\n", "").replace(".venv/bin/stiffdice", f"{sys.executable} -m stiffdice.cli")
     done = subprocess.run(["bash", "-ec", command], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "my-cube.h5: passed" in done.stdout
@@ -89,13 +91,15 @@ def test_the_table_of_scene_keys_has_every_key_and_its_default():
         if key in PRESETS or key == "preset":
             continue
         section, _, name = key.partition(".")
-        if name in stated.INSTEAD.get(section, ()):
+        if name in derived_parameters.INSTEAD.get(section, ()):
             assert row[2] == "", "what is given in other words has no default"
             in_other_words.add(key)
             continue
         told[key] = yaml.safe_load(row[2].strip("`").replace("e4", "e+4"))
     assert told == expected
-    assert in_other_words == {f"{section}.{name}" for section, names in stated.INSTEAD.items() for name in names}
+    assert in_other_words == {
+        f"{section}.{name}" for section, names in derived_parameters.INSTEAD.items() for name in names
+    }
 
 
 def test_the_table_of_study_keys_has_every_key():
@@ -112,6 +116,13 @@ def test_the_table_of_study_keys_has_every_key():
         assert re.search(rf"[`.]{key}[`.]", told), key
 
 
+def test_the_tolerances_that_are_told_are_the_defaults():
+    told = {
+        row[0].strip("`"): float(row[1]) for row in table_keys("config/README.md", "Study") if "`criteria." in row[0]
+    }
+    assert told == {f"criteria.{name}": part.TOLERANCE for name, part in CRITERIA.items()}
+
+
 @pytest.mark.parametrize(("heading", "registry"), [("`measure`", EXPERIMENTS), ("`measure` of a timing", TIMINGS)])
 def test_every_option_of_an_experiment_and_of_a_timing_is_explained(heading, registry):
     text = (ROOT / "config/README.md").read_text().partition(f"| {heading} | what |")[2].partition("\n\n")[0]
@@ -121,9 +132,15 @@ def test_every_option_of_an_experiment_and_of_a_timing_is_explained(heading, reg
             assert part.kind is not part.KEYWORD_ONLY or f"`{option}`" in row, (name, option)
 
 
-def test_every_drawing_is_named():
+def test_the_tables_of_what_a_study_asks_for_name_all_that_there_is():
+    rows = [row for row in table_keys("config/README.md", "Study") if len(row) == 3]
+    of_study = {key: sorted(re.findall(r"`([\w-]+)`", meaning)) for key, _, meaning in rows}
+    assert of_study["`figures.NAME.draw`"] == sorted(DRAWINGS)
+    assert of_study["`tables.NAME.tell`"] == sorted(TABLES)
     text = (ROOT / "config/README.md").read_text()
-    assert all(f"`{name}`" in text for name in [*DRAWINGS, *TABLES, *EXPERIMENTS, *TIMINGS])
+    for heading, registry in (("`measure`", EXPERIMENTS), ("`measure` of a timing", TIMINGS)):
+        rows = text.partition(f"| {heading} | what |")[2].partition("\n\n")[0]
+        assert sorted(re.findall(r"^\| `([\w-]+)` \|", rows, re.MULTILINE)) == sorted(registry)
 
 
 def test_every_scheme_is_explained(capsys):
@@ -183,3 +200,11 @@ def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
     for arguments, output in examples:
         assert main(arguments) == 0
         assert without_times(capsys.readouterr().out) == without_times(output)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_prose_is_in_short_lines(page):
+    """Tables, code, pictures and what has no blank to break at may be longer."""
+    text = re.sub(r"^ *```.*?^ *```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    prose = [line for line in text.splitlines() if not re.match(r"\||\[?!\[|`[^`]*`\W*$", line)]
+    assert [line for line in prose if len(line) > 100] == []

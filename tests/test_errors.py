@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice import inspection
 from stiffdice.errors import InputError, printable
-from stiffdice.io.read import open_file
+from stiffdice.io.reader import open_file
+from stiffdice.report import file_page
 
 NEWEST = Path(__file__).parent / "reference" / "formats" / "1.3"
 
@@ -30,10 +30,10 @@ def test_text_from_elsewhere_is_shown_on_one_line(text, shown):
 
 def test_what_a_file_says_of_itself_is_shown_on_its_own_lines():
     run = open_file(NEWEST / "run.h5")
-    lines = inspection.as_text(run, "run.h5").split("\n")
+    lines = file_page.as_text(run, "run.h5").split("\n")
     evil = "good\nverdict\n  passed\u202e\x1b[1A"
     run.attrs |= {"title": evil, evil: evil}
     run.position.attrs["long_name"] = evil
-    told = inspection.as_text(run, f"\x1b[2J{evil}").split("\n")
+    told = file_page.as_text(run, f"\x1b[2J{evil}").split("\n")
     assert len(told) == len(lines) + 1
     assert all(line.isprintable() for line in told)

@@ -9,11 +9,11 @@ from collections.abc import Collection, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from stiffdice import forecast, job_log, time_left
-from stiffdice.results import Result
-from stiffdice.status_text import duration
-from stiffdice.study import Study
-from stiffdice.time_left import Job
+from stiffdice.study import eta, forecast, job_log
+from stiffdice.study.config import Study
+from stiffdice.study.eta import Job
+from stiffdice.study.outputs import Result
+from stiffdice.study.status_report import duration
 
 MEASURING = ("experiment", "timings")  # of which nothing tells better how long they take than how long they took
 OFTEN, SELDOM, LINES = (
@@ -36,13 +36,13 @@ class Duration:
             folder = Path("results", name)
             for result, seconds in forecast.seconds(study).items():
                 if (folder / result.benchmark).as_posix() in due:
-                    before = time_left.took(folder / result.benchmark) if result.stage in MEASURING else None
+                    before = eta.took(folder / result.benchmark) if result.stage in MEASURING else None
                     self._expected[folder, result] = before or seconds * slowness
         self._name = ", ".join(studies)
 
     def told(self) -> str:
         """Return a line on the whole of it, as it looks before it begins."""
-        alone, here = (time_left.of(self._jobs(), self._cores, pace) for pace in (1.0, self._crowding))
+        alone, here = (eta.of(self._jobs(), self._cores, pace) for pace in (1.0, self._crowding))
         crowd = f"; beside what else runs here now, {duration(here.seconds)}" if self._crowding > CROWDED else ""
         jobs, cores = len(self._expected), f"{self._cores} core{'s' if self._cores > 1 else ''}"
         return f"{self._name}: {jobs} job{'s' if jobs > 1 else ''}, about {duration(alone.seconds)} on {cores}{crowd}"
@@ -55,7 +55,7 @@ class Duration:
         jobs = self._jobs()
         ended = [(job.took, job.weight) for job in jobs if job.took is not None]
         pace = sum(took for took, _ in ended) / sum(weight for _, weight in ended) if ended else self._crowding
-        left = time_left.of(jobs, self._cores, pace)
+        left = eta.of(jobs, self._cores, pace)
         late = left.unknown and not left.seconds
         rest = "what is left takes longer than foreseen" if late else f"about {duration(left.seconds)} left"
         return f"{self._name}: {len(ended)} of {len(jobs)} jobs done, {rest}", left.seconds

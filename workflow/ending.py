@@ -6,9 +6,10 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
-from stiffdice.catalogue import DRAWINGS
 from stiffdice.errors import StiffdiceError, printable
-from stiffdice.io import yaml_file
+from stiffdice.io import yaml_loader
+from stiffdice.study import job_log
+from stiffdice.study.catalogue import DRAWINGS
 
 SCHEMA = "workflow/schemas/study.schema.yaml"
 
@@ -18,13 +19,14 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
 
     root: the project. Where no job says that it failed, Snakemake's own log is all there is to name, if it began one.
     """
-    from stiffdice import status, status_text, study  # half a second
+    from stiffdice.study import config as study
+    from stiffdice.study import status, status_report  # half a second
 
     os.chdir(root)  # scenes are named from here
     lines = []
     for name in sorted(name for name in studies if _at_work(name, begun)):
         try:
-            failed = status_text.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
+            failed = status_report.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
         except StiffdiceError as error:
             failed = f"  {error}"
         if failed:
@@ -39,7 +41,7 @@ def open_first(root: Path, study: str) -> str:
 
     The first that shows more than single runs; else the first figure, or table. One in SVG opens in any browser.
     """
-    plan = yaml_file.load(root / "config" / f"{study}.yaml")
+    plan = yaml_loader.load(root / "config" / f"{study}.yaml")
     figures, tables = plan.get("figures", {}), plan.get("tables", {})
     answers = {name: figure for name, figure in figures.items() if DRAWINGS[figure["draw"]].given != "runs"}
     for kind, shown in (("figures", answers | figures), ("tables", tables)):
@@ -60,7 +62,7 @@ def _log_of_snakemake(begun: float, studies: Collection[str]) -> list[str]:
     """Return where Snakemake's own log of this run is, if it has begun one: the last that names a file of a study."""
     found = [path for path in Path(".snakemake/log").glob("*.snakemake.log") if path.stat().st_mtime >= begun]
     for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True):
-        text = path.read_text(encoding="utf-8", errors="replace")
+        text = job_log.text_of(path)
         if any(f"results/{study}/" in text for study in studies):
             return [f"Snakemake's own log: {path}"]
     return []

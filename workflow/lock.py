@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import fcntl
 import os
-import socket
 from pathlib import Path
 
-from stiffdice import job_log
+from stiffdice.io import host
+from stiffdice.study import job_log
 
 FOLDER = Path(".snakemake", "studies")
 _held: list[int] = []  # closed, and so free, when this process ends
@@ -37,7 +37,7 @@ def hold(root: Path, study: str) -> None:
     except BlockingIOError:
         os.close(_held.pop())
         holder = job_log.read(path)
-        if holder is None or (holder.process, holder.host) != (os.getppid(), socket.gethostname()):
+        if holder is None or (holder.process, holder.host) != (os.getppid(), host.name()):
             raise RunningError(f"{study} is being made already: {_told(holder)}") from None
     except OSError:
         pass

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import resource
 import tempfile
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 ENOUGH = 1 << 16  # bytes that a folder must have room for: what Snakemake notes of some jobs
@@ -43,6 +45,41 @@ def lack_of(root: Path) -> str | None:
         if reason := missing(root / name):
             return f"{reason}; the same command goes on once files can be written there"
     return None
+
+
+def forget_rubbish(root: Path) -> None:
+    """Remove notes of Snakemake that are not JSON, at which it would stop: what is due does not hang on them.
+
+    Raises RoomError if one cannot be read or removed.
+    """
+    folders = (root / ".snakemake" / name for name in ("metadata", "incomplete"))
+    for path in chain.from_iterable(folder.rglob("*") for folder in folders):
+        try:
+            if path.is_file() and not _is_note(path):
+                path.unlink()
+        except OSError as error:
+            raise RoomError(f"{path}: {error.strerror}; remove it, then the same command") from None
+
+
+def _is_note(path: Path) -> bool:
+    try:
+        return isinstance(json.loads(path.read_bytes()), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def clear_way(paths: Iterable[Path]) -> None:
+    """Remove those logs and benchmarks that lead nowhere or are another user's, so that jobs can write their own.
+
+    Raises RoomError if one cannot be removed.
+    """
+    for path in paths:
+        leads_nowhere = path.is_symlink() and not path.exists()
+        if leads_nowhere or (path.is_file() and not os.access(path, os.R_OK | os.W_OK)):
+            try:
+                path.unlink()
+            except OSError as error:
+                raise RoomError(f"{path}: {error.strerror}; have it removed, then the same command") from None
 
 
 def prepare(root: Path, cores: int) -> tuple[dict[str, str], list[str]]:

@@ -23,8 +23,10 @@ import ending  # noqa: E402
 import lock  # noqa: E402
 import room  # noqa: E402
 
-from stiffdice.parent import end_with_parent  # noqa: E402
-from stiffdice.time_left import took  # noqa: E402
+from stiffdice.errors import printable  # noqa: E402
+from stiffdice.study import job_log  # noqa: E402
+from stiffdice.study.eta import took  # noqa: E402
+from stiffdice.study.process import end_with_parent  # noqa: E402
 
 # Of Snakemake, at most: what is made again because it was damaged may show that another result was.
 ROUNDS = 4
@@ -32,7 +34,7 @@ ROUNDS = 4
 
 def seconds_of_simulation(log: Path) -> float:
     """Return the seconds that a job says it spent in the simulator; 0 if it says nothing."""
-    found = re.search(r"^simulation: ([0-9.]+) s$", log.read_text(encoding="utf-8"), re.MULTILINE)
+    found = re.search(r"^simulation: ([0-9.]+) s$", job_log.text_of(log), re.MULTILINE)
     return float(found[1]) if found else 0.0
 
 
@@ -87,7 +89,7 @@ def table(jobs: dict[str, list[tuple[float, float]]], elapsed: float, cores: int
 def set_aside_since(begun: float, studies: list[str]) -> dict[str, str]:
     """Return the results that jobs since `begun` refused and set aside, with the reason of each, as their logs say."""
     logs = written_since(begun, studies, "logs/**/*.log")
-    found = (re.findall(r"^set aside: (\S+): (.*)$", log.read_text(encoding="utf-8"), re.MULTILINE) for log in logs)
+    found = (re.findall(r"^set aside: (\S+): (.*)$", job_log.text_of(log), re.MULTILINE) for log in logs)
     return {path: reason for pairs in found for path, reason in pairs}
 
 
@@ -110,7 +112,7 @@ def rounds(command: list[str], environment: dict[str, str], studies: list[str]) 
         print(f"\nstiffdice: {len(damaged)} damaged, set aside; Snakemake runs again to make them", flush=True)
     if status == 0:
         for path, reason in made_again.items():
-            print(f"made again: {path}: {reason}")
+            print(printable(f"made again: {path}: {reason}"))
     return status
 
 
@@ -118,7 +120,10 @@ def main() -> int:
     """Run Snakemake with its default profile and return its exit status."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--cores", type=int, required=True)
+    parser.add_argument("--end-with-parent", action="store_true", help="be killed with make, which calls this")
     options, rest = parser.parse_known_args()
+    if options.end_with_parent:
+        end_with_parent("make")
     begun, studies = time.time(), asked_for(rest)
     # By its name, as links to it (profiles/) are not in an archive.
     named = any(part.startswith("--workflow-profile") for part in rest)
@@ -128,18 +133,19 @@ def main() -> int:
         changes, told = room.prepare(ROOT, options.cores)
         for name in studies:
             lock.hold(ROOT, name)
+        room.forget_rubbish(ROOT)
     except (room.RoomError, lock.RunningError) as error:
-        print(f"stiffdice: {error}", file=sys.stderr)
+        print(f"stiffdice: {printable(error)}", file=sys.stderr)
         return 2
     for line in told:
-        print(f"stiffdice: {line}", file=sys.stderr)
+        print(f"stiffdice: {printable(line)}", file=sys.stderr)
     try:
         status = rounds(command, os.environ | changes, studies)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
     if status and (reason := room.lack_of(ROOT)):
-        print(f"stiffdice: {reason}", file=sys.stderr)
+        print(f"stiffdice: {printable(reason)}", file=sys.stderr)
     jobs = jobs_since(begun, studies)
     if status:
         print(ending.told(ROOT, begun, studies), flush=True)

@@ -13,9 +13,9 @@ def printable(text: object) -> str:
 
 
 class StiffdiceError(Exception):
-    """An error whose message is written for the person who ran the command: one line, exit status 2.
+    """An error whose message is written for people: one printable line; the command line exits with status 2.
 
-    What a file says may be in it, so it is made `printable`.
+    Every error below is one, so that `except StiffdiceError` catches all that is no fault of the program.
     """
 
     def __init__(self, message: str = "") -> None:

@@ -9,13 +9,17 @@ from pathlib import Path
 import yaml
 from tests import rounds
 
-from stiffdice import asked, figures, frontier, job_log, results, shards, study, sweep
-from stiffdice import scene as scenes
-from stiffdice.catalogue import TABLES
-from stiffdice.io.layout import run_dataset
-from stiffdice.io.read import open_file, parts
-from stiffdice.io.write import write_bytes, write_dataset
-from stiffdice.simulate import simulate
+from stiffdice.io.reader import open_file, parts
+from stiffdice.io.writer import write_bytes, write_dataset
+from stiffdice.report.figures import registry as figures
+from stiffdice.scene import scene as scenes
+from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.run import simulate
+from stiffdice.study import config as study
+from stiffdice.study import job_log, outputs, provenance
+from stiffdice.study.catalogue import TABLES
+from stiffdice.study.output_digest import digest_of
+from stiffdice.sweep import partition, stability_limits, sweep
 
 ROOT = Path(__file__).parent.parent.parent
 SWEEP = {
@@ -41,7 +45,7 @@ TINY = {
         "steps": {**rounds.asked_in_parts(SWEEP, 2), "scene": "my-scene.yaml"},
     },
     "figures": {"position": {"draw": "position", "run": "fall", "title": "Position & place"}},
-    "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
+    "tables": {"answers": {"tell": "paper-questions", "of": ["steps"], "title": "Answers"}},
 }
 AN_HOUR = 1_800_000_000  # seconds since 1970: 2027-01-15 08:00:00 UTC
 
@@ -52,7 +56,7 @@ def project(folder: Path) -> Path:
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
     # A few sources stand for all, so that tests do not digest and deflate them again and again.
     (folder / "src/stiffdice/io").mkdir(parents=True)
-    for name in ("__init__.py", "errors.py", "io/read.py"):
+    for name in ("__init__.py", "errors.py", "io/reader.py"):
         shutil.copy(ROOT / "src/stiffdice" / name, folder / "src/stiffdice" / name)
     for path in ROOT.iterdir():
         if path.is_file() and not path.name.startswith("."):
@@ -72,11 +76,10 @@ def plan(folder: Path) -> study.Study:
 
 def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
     """Make all results of the study in a project, with logs and benchmarks of jobs that ended then [s since 1970]."""
-    top, asks = folder / "results/tiny", asked.of(planned, folder)
-    for result in results.of(planned):
+    top, asks = folder / "results/tiny", provenance.of(planned, folder)
+    for result in outputs.of(planned):
         for name in (*result.files, result.log, result.benchmark):
             (top / name).parent.mkdir(parents=True, exist_ok=True)
-        (top / result.log).write_text(f"{job_log.asked(asks[result])}\ndone at {ended}\n")
         (top / result.benchmark).write_text(f"s\th:m:s\n12.5\t{ended}\n")
         os.utime(top / result.benchmark, (ended, ended))
         first = top / result.files[0]
@@ -86,20 +89,22 @@ def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
             write_dataset(run_dataset(simulate(given, model=run.model, steps=run.steps, every=run.every)), first)
         elif result.stage == "shard":
             grid = planned.sweeps["steps"]
-            sweep.compute(grid, shards.of(grid)[first.stem].pieces, first)
+            sweep.compute(grid, partition.of(grid)[first.stem].pieces, first)
         elif result.stage == "collect":
             runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path))
             write_dataset(sweep.collect(runs, planned.sweeps["steps"].criteria), first)
             write_bytes(b"shard,cells\n", top / result.files[1])
         elif result.stage == "frontier":
-            found = frontier.find(open_file(top / "sweeps/steps/sweep.h5"))
+            found = stability_limits.find(open_file(top / "sweeps/steps/sweep.h5"))
             write_dataset(found, first)
-            write_bytes(frontier.table(found).encode(), top / result.files[1])
+            write_bytes(stability_limits.table(found).encode(), top / result.files[1])
         elif result.stage == "figure":
             data = {"as_listed": open_file(top / "runs/fall.as_listed.h5")}
             figures.draw("position", data, "Position", 60, [str(top / file) for file in result.files])
         else:
-            told = TABLES["answers"].load()({"steps": open_file(top / "sweeps/steps/frontier.h5")}, "Answers")
+            told = TABLES["paper-questions"].load()({"steps": open_file(top / "sweeps/steps/frontier.h5")}, "Answers")
             write_bytes(told.markdown.encode(), first)
             write_bytes(told.csv.encode(), top / result.files[1])
+        digests = [job_log.made(name, digest_of(top / name)) for name in result.files]
+        (top / result.log).write_text("\n".join([job_log.asked(asks[result]), *digests, f"done at {ended}\n"]))
     (top / "report.html").write_text(f"<p>made at {ended}</p>")

@@ -14,12 +14,14 @@ import pytest
 import yaml
 from tests.archive import packing, roc
 
-from stiffdice import __version__, results, study
+from stiffdice import __version__
 from stiffdice.archive import crate
 from stiffdice.archive.citation import Citation
 from stiffdice.archive.pack import pack
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io.read import open_file
+from stiffdice.io.reader import open_file
+from stiffdice.study import config as study
+from stiffdice.study import outputs
 
 # Its demands are those of Process Run Crate, Workflow RO-Crate and RO-Crate 1.1, and its own.
 PROFILE = "workflow-run-crate"
@@ -112,7 +114,7 @@ def test_every_file_that_is_described_is_there_as_described(files, entities):
 
 def test_the_run_made_all_results_of_the_study_from_its_scenes(finished, entities):
     run = entities["#run"]
-    made = {f"results/tiny/{file}" for result in results.of(finished[1]) for file in result.files}
+    made = {f"results/tiny/{file}" for result in outputs.of(finished[1]) for file in result.files}
     assert set(ids(run["result"])) == made | {"results/tiny/"}
     assert set(ids(run["object"])) == {
         "#study-given",
@@ -149,7 +151,7 @@ def test_a_benchmark_that_is_none_is_told(finished, tmp_path):
 
 def test_every_result_of_every_kind_is_described():
     told = study.load(packing.ROOT / "config/tradeoff.yaml", packing.ROOT / "workflow/schemas/study.schema.yaml")
-    described = {result.stage: crate.describe(result, ".h5", told) for result in results.of(told)}
+    described = {result.stage: crate.describe(result, ".h5", told) for result in outputs.of(told)}
     assert described.keys() >= {"experiment", "timings", "figure", "table"}
     assert "differ between two rebuilds" in described["timings"]
     assert all(described.values())

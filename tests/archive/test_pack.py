@@ -16,12 +16,12 @@ from pathlib import Path
 import pytest
 from tests.archive import packing
 
-from stiffdice import results
 from stiffdice.archive import manifest
 from stiffdice.archive.pack import pack
-from stiffdice.cli import main
+from stiffdice.cli.main import main
 from stiffdice.errors import InputError, OutputError, RefusedError
-from stiffdice.io.read import open_file
+from stiffdice.io.reader import open_file
+from stiffdice.study import outputs
 
 FORMATS = packing.ROOT / "tests" / "reference" / "formats"
 
@@ -51,11 +51,11 @@ def contents(path: Path) -> dict[str, bytes]:
 def test_all_that_a_study_is_made_of_is_in_it(finished, packed):
     found = contents(packed.path).keys()
     planned = finished[1]
-    expected = {f"results/tiny/{file}" for result in results.of(planned) for file in result.files}
-    expected |= {f"results/tiny/{side}" for result in results.of(planned) for side in (result.log, result.benchmark)}
+    expected = {f"results/tiny/{file}" for result in outputs.of(planned) for file in result.files}
+    expected |= {f"results/tiny/{side}" for result in outputs.of(planned) for side in (result.log, result.benchmark)}
     expected |= {"results/tiny/report.html", "config/tiny.yaml", "my-scene.yaml", "config/scenes/figure-09.yaml"}
     expected |= {"LICENSE", "CITATION.cff", "README.md", "Makefile", "Snakefile", "pyproject.toml", "workflow/run.py"}
-    expected |= {"requirements/requirements.lock", "workflow/schemas/study.schema.yaml", "src/stiffdice/io/read.py"}
+    expected |= {"requirements/requirements.lock", "workflow/schemas/study.schema.yaml", "src/stiffdice/io/reader.py"}
     assert expected <= found
 
 
@@ -156,7 +156,7 @@ def test_a_result_of_an_earlier_format_is_told_and_not_packed(own, tmp_path):
     folder, planned = own
     (run,) = (folder / "results" / "tiny" / "runs").glob("*.as_listed.h5")
     shutil.copy(FORMATS / "1.1" / "run.h5", run)
-    with pytest.raises(InputError, match=rf"{run.name}: of format 1.1, made by earlier code"):
+    with pytest.raises(InputError, match=rf"{run.name}: its .h5 is not what its job made"):
         pack(planned, folder, tmp_path / "x.zip")
     assert not (tmp_path / "x.zip").exists()
 
@@ -170,7 +170,7 @@ def test_a_damaged_result_is_told_and_not_packed(own, tmp_path):
     with pytest.raises(RefusedError, match=rf"{shard.name}: damaged"):
         pack(planned, folder, tmp_path / "a.zip")
     shard.write_bytes(b"")
-    with pytest.raises(RefusedError, match=rf"{shard.name}: empty"):
+    with pytest.raises(InputError, match=rf"{shard.name}: its .h5 is not what its job made"):
         pack(planned, folder, tmp_path / "a.zip")
     assert list(tmp_path.glob("*.zip")) == list(tmp_path.glob(".*.part")) == []
 

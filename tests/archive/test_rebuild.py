@@ -1,29 +1,40 @@
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
+import time
 import zipfile
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 import yaml
+from tests.archive import sandboxes
 
-from stiffdice import figures, ledger
-from stiffdice import study as studies
+from stiffdice import __version__
 from stiffdice.archive import manifest
-from stiffdice.archive.rebuild import ARCHIVED, RunError, other_versions, rebuild
+from stiffdice.archive.rebuild import ARCHIVED, REBUILT, RunError, opened, other_versions, rebuild, way_of
+from stiffdice.archive.sandbox import unconfined
 from stiffdice.archive.verify import CRATE
-from stiffdice.cli import main
+from stiffdice.cli.main import main
 from stiffdice.errors import RefusedError
-from stiffdice.io.layout import run_dataset
-from stiffdice.io.read import open_file
-from stiffdice.io.write import write_dataset
-from stiffdice.scene import load
-from stiffdice.simulate import simulate
+from stiffdice.io.reader import open_file
+from stiffdice.io.writer import write_dataset
+from stiffdice.report.figures import registry as figures
+from stiffdice.scene.scene import load
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.run import simulate
+from stiffdice.study import config as studies
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[2]
 STUDY = {
     "question": "Is it the same again?",
     "runs": {"fall": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 400, "every": 1}},
@@ -46,7 +57,7 @@ def packed(folder: Path, path: Path) -> Path:
     return path
 
 
-# A project as ours is laid out, whose workflow has one job that says what the run was given.
+# A project as ours is laid out, of other code, whose workflow has one job that says what the run was given.
 SNAKEFILE = """\
 rule study:
     input: expand("results/{study}/{name}", study=config["study"], name=["same.txt", "runs.csv", "figures/t.svg"])
@@ -72,6 +83,18 @@ for path, text in zip(snakemake.output, ("same", "1,2,3", str(time.time_ns()))):
     with open(path, "w") as file:
         file.write(text)
 """
+# Leaves a process that has nothing to do with it any more, and does not end.
+STUBBORN = """\
+import os, signal, time
+for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT):
+    signal.signal(number, signal.SIG_IGN)
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        os.execvp("sleep", ["sleep", "600"])
+    os._exit(0)
+time.sleep(600)
+"""
 RUN_PY = """\
 import subprocess, sys
 sys.exit(subprocess.run([sys.executable, "-m", "snakemake", *sys.argv[1:]]).returncode)
@@ -90,7 +113,7 @@ def project(tmp_path):
         "results/tiny/figures/t.svg": "some time",
         "results/tiny/logs/job.log": "at noon",
         "results/README.md": "results",
-        "src/stiffdice/__init__.py": 'HERE = "the archive\'s own"\n',
+        "src/stiffdice/__init__.py": '__version__ = "0.0.7"\nHERE = "the archive\'s own"\n',
         "workflow/run.py": RUN_PY,
         "workflow/profiles/default/config.yaml": "nolock: true\n",
         "workflow/scripts/job.py": JOB,
@@ -103,45 +126,183 @@ def project(tmp_path):
 
 
 @pytest.mark.workflow
-def test_it_runs_the_archives_own_code_away_from_everything(project, tmp_path, monkeypatch, capsys):
-    """No network, no home, none of the variables of who runs it; and it says what is the same and what may differ."""
+@pytest.mark.parametrize("in_sandbox", [pytest.param(True, marks=sandboxes.needed), False])
+def test_it_runs_other_code_away_from_everything(project, tmp_path, monkeypatch, in_sandbox):
+    """No network, no home, none of the variables of who runs it; and it says whose code gives what."""
     monkeypatch.setenv("SECRET", "leaks")
-    path = packed(project, tmp_path / "a.zip")
-    rebuilt = rebuild(path)
+    with opened(packed(project, tmp_path / "a.zip")) as unpacked:
+        assert unpacked.code.version == "0.0.7" and not unpacked.code.is_installed
+        rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox))
     assert rebuilt.ok and rebuilt.different == {}
     assert rebuilt.same == ["results/tiny/runs.csv", "results/tiny/same.txt"]
     assert rebuilt.left_out == ["results/tiny/figures/t.svg", "results/tiny/logs/job.log"]
     assert any("the archive's lock says 0.0.1" in note for note in rebuilt.notes)
+    assert "made again by the archive's own code, not the installed: 2 files are the same" in rebuilt.lines()[0]
+    told = "\n".join(rebuilt.notes)
+    assert f"says to be stiffdice 0.0.7, installed is {__version__}: " in told
+    assert "equal files say that its own code gives them, not what this computes" in told
+    assert ("could have copied the archive's results" in told) == (not in_sandbox)
+
+
+@sandboxes.needed
+@pytest.mark.workflow
+def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
     (project / "results/tiny/same.txt").write_text("same but for this")
-    packed(project, path)
-    assert main(["rebuild", str(path), "-o", str(tmp_path / "kept")]) == 1
+    path, kept = packed(project, tmp_path / "a.zip"), tmp_path / "kept"
+    assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 1
     assert "DIFFERS: results/tiny/same.txt: 17 bytes archived, 4 now" in capsys.readouterr().out
-    assert (tmp_path / "kept" / "results/tiny/same.txt").read_text() == "same"
-    assert (tmp_path / "kept" / ARCHIVED / "tiny/same.txt").read_text() == "same but for this"
+    assert (kept / REBUILT / "results/tiny/same.txt").read_text() == "same"
+    assert (kept / ARCHIVED / "results/tiny/same.txt").read_text() == "same but for this"
+    assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 2
+    assert "is not empty" in capsys.readouterr().err
+
+
+@pytest.mark.workflow
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        ("pass", "was not made"),
+        (
+            "p = os.path.abspath; os.symlink(p('.').replace('rebuilt', 'archived') + '/' + out, p(out))",
+            "there is a link",
+        ),
+    ],
+)
+def test_what_was_not_made_is_not_the_same(project, tmp_path, made, reason):
+    """A run that does nothing, or leads to the archive's own results: neither is the same to the last bit."""
+    run = f"import os\nout = 'results/tiny/same.txt'\nos.makedirs('results/tiny')\n{made}\n"
+    (project / "workflow/run.py").write_text(run)
+    with opened(packed(project, tmp_path / "a.zip"), tmp_path / "kept") as unpacked:
+        rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox=False))
+    assert not rebuilt.ok and rebuilt.same == []
+    assert reason in rebuilt.different["results/tiny/same.txt"][0]
+
+
+def test_nothing_to_compare_is_not_the_same(project, tmp_path):
+    for name in ("same.txt", "runs.csv", "figures/t.svg"):
+        (project / "results/tiny" / name).unlink()
+    (project / "workflow/run.py").write_text("")
+    with opened(packed(project, tmp_path / "a.zip")) as unpacked:
+        rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox=False))
+    assert not rebuilt.ok and rebuilt.different == {} and "there was nothing to compare" in rebuilt.notes
 
 
 @pytest.mark.workflow
 def test_a_run_that_fails_is_told_with_its_last_lines(project, tmp_path, capsys):
     (project / "workflow/scripts/job.py").write_text("raise ValueError('out of luck')")
     path = packed(project, tmp_path / "a.zip")
-    with pytest.raises(RunError, match=r"(?s)exit status 1.*out of luck"):
-        rebuild(path)
+    with pytest.raises(RunError, match=r"(?s)exit status 1.*out of luck"), opened(path) as unpacked:
+        rebuild(unpacked, way_of(unpacked, in_sandbox=False))
     (project / "workflow/run.py").write_text("raise SystemExit('cannot \\x1b[2J even start')")
-    assert main(["rebuild", str(packed(project, path))]) == 2
+    assert main(["rebuild", "--yes", "--no-sandbox", str(packed(project, path))]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert lines[0].endswith("exit status 1:") and lines[-1] == r"  cannot \x1b[2J even start"
 
 
-def test_what_fails_a_check_is_not_run_and_not_left_behind(project, tmp_path):
+def test_what_fails_a_check_is_not_run_and_not_left_behind(project, tmp_path, capsys):
     """Nothing of an archive is executed before all of it has passed."""
     (project / "workflow/run.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'w')")
     path = packed(project, tmp_path / "a.zip")
     (project / "extra").write_text("")
     with zipfile.ZipFile(path, "a") as archive:
         archive.write(project / "extra", "extra")
-    with pytest.raises(RefusedError, match=r"extra: there, but not listed in .*; not run"):
-        rebuild(path, tmp_path / "kept")
+    assert main(["rebuild", "--yes", "--no-sandbox", str(path), "-o", str(tmp_path / "kept")]) == 2
+    told = capsys.readouterr().err
+    assert "extra: there, but not listed in " in told and "; not run" in told
     assert {file.name for file in tmp_path.iterdir()} == {"content", "a.zip"}
+
+
+def on_terminal(answer: str, *words: str) -> tuple[int, str]:
+    """Return the exit status of a rebuild that has a terminal to ask on, and what it said there."""
+    ours, its = os.openpty()
+    command = [sys.executable, "-m", "stiffdice.cli", "rebuild", *words]
+    with subprocess.Popen(command, stdin=its, stderr=its, stdout=subprocess.DEVNULL) as asking:
+        os.write(ours, answer.encode())
+        status = asking.wait(60)
+    told = os.read(ours, 1 << 16).decode()
+    os.close(ours)
+    os.close(its)
+    return status, told
+
+
+def test_other_code_is_run_only_if_somebody_says_so(project, tmp_path, capsys):
+    """Without a terminal by --yes, on one by the answer; nothing of it is executed before."""
+    executed = tmp_path / "executed"
+    (project / "workflow/run.py").write_text(f"open({str(executed)!r}, 'w')")
+    words = [str(packed(project, tmp_path / "a.zip")), "--no-sandbox"]
+    assert main(["rebuild", *words, "-o", str(tmp_path / "kept")]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1 and "nobody is here to be asked" in told and "--yes runs it without a sandbox" in told
+    status, told = on_terminal("\n", *words)
+    assert status == 2 and told.rstrip().endswith("a.zip: not run")
+    assert "says to be stiffdice 0.0.7" in told and "without a sandbox: it can read, change and remove" in told
+    assert not executed.exists() and not (tmp_path / "kept").exists()
+    assert on_terminal("y\n", *words)[0] == 1 and executed.exists()
+
+
+def test_without_a_sandbox_other_code_is_not_run(project, tmp_path, monkeypatch, capsys):
+    path = packed(project, tmp_path / "a.zip")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["rebuild", "--yes", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert "bubblewrap (bwrap) is not installed; --no-sandbox would let it do whatever you can" in told
+
+
+def test_a_run_is_ended_by_an_error_of_who_waits_for_it(project, tmp_path):
+    (project / "workflow/run.py").write_text(STUBBORN)
+
+    def tell(text: str) -> None:
+        raise InterruptedError
+
+    with opened(packed(project, tmp_path / "a.zip")) as unpacked, pytest.raises(InterruptedError):
+        rebuild(unpacked, way_of(unpacked, in_sandbox=False), tell=tell)
+    assert [child for child in psutil.Process().children(recursive=True) if str(tmp_path) in child.cwd()] == []
+
+
+def all_of(running: psutil.Popen, name: str) -> list[psutil.Process]:
+    """Return all that a process has started, once one of them has a name."""
+    until = time.monotonic() + 60
+    while running.poll() is None and time.monotonic() < until:
+        found = running.children(recursive=True)
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if name in [process.name() for process in found]:
+                return found
+        time.sleep(0.1)
+    raise AssertionError(f"no {name} is started")
+
+
+@pytest.mark.workflow
+@pytest.mark.parametrize(
+    ("words", "number", "status"),
+    [
+        pytest.param([], signal.SIGHUP, 129, marks=sandboxes.needed),
+        pytest.param([], signal.SIGTERM, 143, marks=sandboxes.needed),
+        pytest.param([], signal.SIGINT, 130, marks=sandboxes.needed),
+        pytest.param([], signal.SIGKILL, -9, marks=sandboxes.needed),
+        (["--no-sandbox"], signal.SIGTERM, 143),
+        (["--no-sandbox"], signal.SIGKILL, -9),
+    ],
+)
+def test_nothing_of_a_run_outlives_it(project, tmp_path, words, number, status):
+    """However it ends, also what has left its session and pays no attention; only a kill leaves files behind."""
+    if words and "leave processes behind" in unconfined(tmp_path).could:
+        pytest.skip("this system gives no process namespace")
+    (project / "workflow/scripts/job.py").write_text(STUBBORN)
+    (temporary := tmp_path / "temporary").mkdir()
+    command = ["env", "--default-signal=HUP,INT,TERM", sys.executable, "-m", "stiffdice.cli", "rebuild"]
+    command += ["--yes", *words]
+    running = psutil.Popen(
+        [*command, str(packed(project, tmp_path / "a.zip"))],
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    of_it = all_of(running, "sleep")
+    running.send_signal(number)
+    assert running.wait(10) == status
+    _, alive = psutil.wait_procs(of_it, timeout=5)
+    assert alive == []
+    assert bool(list(temporary.iterdir())) == (number == signal.SIGKILL)
 
 
 @pytest.mark.parametrize(
@@ -156,8 +317,8 @@ def test_what_fails_a_check_is_not_run_and_not_left_behind(project, tmp_path):
 )
 def test_what_cannot_be_made_again_is_refused(project, tmp_path, change, words):
     change(project)
-    with pytest.raises(RefusedError, match=words):
-        rebuild(packed(project, tmp_path / "a.zip"))
+    with pytest.raises(RefusedError, match=words), opened(packed(project, tmp_path / "a.zip")):
+        pass
 
 
 def test_a_lock_of_this_environment_has_nothing_to_tell(tmp_path):
@@ -170,7 +331,10 @@ def test_a_lock_of_this_environment_has_nothing_to_tell(tmp_path):
 @pytest.mark.long
 @pytest.mark.workflow
 def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema, capsys):
-    """Ours: what this process computes, a workflow in another place does, to the last bit; and a forgery differs."""
+    """Ours: what this process computes, a workflow in another place does, to the last bit; and a forgery differs.
+
+    The code is the installed code, so nobody is asked, and nothing else in the archive is executed.
+    """
     folder = tmp_path / "content"
     for name in ("workflow", "config", "src", "requirements"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
@@ -181,14 +345,17 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
     for preset in ("as_listed", "as_written"):
         scene = load(ROOT / "config/scenes/figure-09.yaml", preset=preset)
         run = run_dataset(simulate(scene, model="sliding", steps=400, every=1), f"fall, {preset.replace('_', ' ')}")
-        books = ledger.keep(scene, model="sliding", steps=400)
+        books = energy_budget.keep(scene, model="sliding", steps=400)
         path = folder / f"results/tiny/runs/fall.{preset}.h5"
-        write_dataset(run.assign(ledger.variables(books)), path)
+        write_dataset(run.assign(energy_budget.variables(books)), path)
     data = {preset: open_file(folder / f"results/tiny/runs/fall.{preset}.h5") for preset in ("as_listed", "as_written")}
     drawn = [str(folder / f"results/tiny/figures/position.{suffix}") for suffix in ("svg", "png")]
     figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml", study_schema).dpi, drawn)
     write_dataset(data["as_written"].assign_attrs(title="forged"), folder / RUN)
+    # What `python -m snakemake` would find before the libraries.
+    (folder / "yaml.py").write_text("raise SystemExit('of the archive')")
     path = packed(folder, tmp_path / "a.zip")
     assert main(["rebuild", str(path), "-o", str(tmp_path / "kept")]) == 1
     out = capsys.readouterr().out
-    assert "3 files are the same to the last bit, 1 differ" in out and f"DIFFERS: {RUN}" in out
+    assert f"made again by the installed code, stiffdice {__version__}: 3 files are the same to the last bit" in out
+    assert f"1 differ; 0 hold or show times and are not compared\nDIFFERS: {RUN}" in out

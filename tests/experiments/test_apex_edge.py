@@ -8,8 +8,8 @@ import pytest
 
 from stiffdice.errors import InputError
 from stiffdice.experiments import apex_edge
-from stiffdice.scene import Scene, from_mapping
-from stiffdice.simulate import simulate
+from stiffdice.scene.scene import Scene, from_mapping
+from stiffdice.simulation.run import simulate
 
 STIFF = Scene().with_ground(stiffness=1e6)
 

@@ -6,8 +6,8 @@ import xarray as xr
 
 from stiffdice.errors import InputError
 from stiffdice.experiments import bounce_map
-from stiffdice.io.write import write_dataset
-from stiffdice.scene import from_mapping
+from stiffdice.io.writer import write_dataset
+from stiffdice.scene.scene import from_mapping
 
 STIFF = {"ground": {"stiffness": 1e6}}
 PHASES = 200

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice import theory
+from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
 from stiffdice.experiments import rocking
-from stiffdice.io.enums import meanings_of
-from stiffdice.io.write import write_dataset
-from stiffdice.scene import Launch, Scene, from_mapping
-from stiffdice.simulate import simulate
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.io.writer import write_dataset
+from stiffdice.scene.scene import Launch, Scene, from_mapping
+from stiffdice.simulation.run import simulate
 
 ZETA = (0.0, 0.1, 0.5, 1.0)
 SMALL = {"cube": {"radius": 0.2, "mass": 3.0, "geometry": "exact"}, "ground": {"stiffness": 3e5, "normal": [1, 0, 2]}}
@@ -54,16 +54,16 @@ def test_a_nudge_is_neutral_below_the_limit_and_grows_above_as_theory_says(measu
     assert damped[..., below].max() < 0.96
     assert damped[..., above].min() > 1.04
     for growth, zeta in ((undamped, 0.0), (damped, 0.2)):
-        limit = theory.stability_limit(zeta)
+        limit = linear_theory.stability_limit(zeta)
         for away in (below, above):
-            wanted = [theory.growth(part * limit, zeta) for part in relative[away]]
+            wanted = [linear_theory.growth(part * limit, zeta) for part in relative[away]]
             np.testing.assert_allclose(growth[..., away], np.broadcast_to(wanted, growth[..., away].shape), rtol=2e-5)
 
 
 def test_growth_is_what_one_step_does_to_a_run_above_the_limit():
     """Seen in a run of the model that does not turn: each step multiplies the displacement by −growth."""
     scene = Scene().with_ground(friction=0, damping=0, contact="gated")
-    h = 1.05 * 2 / theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    h = 1.05 * 2 / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
     rest = scene.cube.side / 2 - scene.gravity / (4 * scene.ground.stiffness)
     launch = Launch(position=(0, 0, rest + 1e-10), velocity=(0, 0, 0))
     run = simulate(dataclasses.replace(scene, launch=launch, duration=20 * h), model="sliding", steps=20, every=1)

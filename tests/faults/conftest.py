@@ -33,10 +33,14 @@ SMALL = {
         ),
     },
     "experiments": {
-        "books": {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}}
+        "books": {
+            "measure": "energy-budget",
+            "scene": "config/scenes/figure-09.yaml",
+            "options": {"steps": [10000, 20000]},
+        }
     },
-    "figures": {"books": {"draw": "ledger", "of": ["books"], "title": "Books"}},
-    "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
+    "figures": {"books": {"draw": "energy-budget", "of": ["books"], "title": "Books"}},
+    "tables": {"answers": {"tell": "paper-questions", "of": ["steps"], "title": "Answers"}},
 }
 
 

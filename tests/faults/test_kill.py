@@ -10,7 +10,6 @@ import contextlib
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,7 +19,8 @@ import numpy as np
 import psutil
 import pytest
 
-from stiffdice.io.write import write_bytes
+from stiffdice.io import host
+from stiffdice.io.writer import write_bytes
 
 KILLS = int(os.environ.get("STIFFDICE_KILLS", "12"))
 SEED = int(os.environ.get("STIFFDICE_SEED", str(time.time_ns() % 10**6)))
@@ -127,11 +127,12 @@ WRITING = """
 import json, os, signal, sys, time
 from pathlib import Path
 import numpy as np, xarray as xr
-from stiffdice import scene, sweep
-from stiffdice.grid import Piece, Sweep
+from stiffdice.scene import scene
+from stiffdice.sweep import sweep
+from stiffdice.sweep.grid import Piece, Sweep
 from stiffdice.io import seal
-from stiffdice.io.spool import Spool
-from stiffdice.io.write import write_bytes, write_dataset
+from stiffdice.io.shard_writer import Spool
+from stiffdice.io.writer import write_bytes, write_dataset
 
 WHAT, KILLS, SEED = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 rng = np.random.default_rng(SEED)
@@ -205,8 +206,8 @@ def test_a_killed_writer_leaves_the_old_file_or_the_new_one(undisturbed, tmp_pat
 TWO = """
 import os, sys
 import numpy as np, xarray as xr
-from stiffdice.io.spool import Spool
-from stiffdice.io.write import write_dataset
+from stiffdice.io.shard_writer import Spool
+from stiffdice.io.writer import write_dataset
 whole = xr.Dataset({"ratio": (("cell", "member"), np.ones((8, 500)))}, attrs={"format_version": "1.2"})
 def spooled(path):
     with Spool(path, whole.isel(cell=slice(1))) as spool:
@@ -232,13 +233,13 @@ def test_writers_of_one_file_at_once_all_succeed(tmp_path):
 def test_only_what_the_dead_of_this_host_left_is_removed(tmp_path):
     gone = subprocess.Popen(["true"])
     gone.wait()
-    host = socket.gethostname()
+    here = host.name()
     names = [
-        f".x.h5.{host}.{gone.pid}.part",
-        f".x.h5.{host}.{os.getpid()}0.part",  # no process has such a number
-        f".x.h5.{host}.{os.getppid()}.part",
+        f".x.h5.{here}.{gone.pid}.part",
+        f".x.h5.{here}.{os.getpid()}0.part",  # no process has such a number
+        f".x.h5.{here}.{os.getppid()}.part",
         f".x.h5.elsewhere.{gone.pid}.part",
-        f".y.h5.{host}.{gone.pid}.part",
+        f".y.h5.{here}.{gone.pid}.part",
     ]
     for name in names:
         (tmp_path / name).write_text("half")
@@ -251,7 +252,9 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="other systems have n
 
 @linux
 def test_a_process_ends_with_its_parent():
-    child = "from stiffdice.parent import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
+    child = (
+        "from stiffdice.study.process import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
+    )
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
     started = subprocess.Popen([sys.executable, "-c", parent], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert started.stdout.readline() == b"1\n"
@@ -266,7 +269,7 @@ def test_a_process_ends_with_its_parent():
 @linux
 def test_a_process_whose_parent_is_gone_already_does_not_begin(tmp_path):
     child = (
-        "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.parent import end_with_parent\n"
+        "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.study.process import end_with_parent\n"
         "while os.getppid() == int(sys.argv[1]): time.sleep(0.01)\n"
         "Path('told').write_text(f'{os.getpid()} {os.getppid()} \\n')\n"
         "end_with_parent('no such program')\nPath('begun').touch()"

@@ -131,7 +131,9 @@ def test_nowhere_to_keep_compiled_kernels_is_one_line(undisturbed):
     places = (
         "for place in / /tmp /var/tmp; do mount --bind $place $place; mount -o remount,bind,ro $place; done; cd /tmp;"
     )
-    command = f"{sys.executable} -m stiffdice run {undisturbed.folder}/config/scenes/figure-09.yaml -o /dev/shm/out.h5"
+    command = (
+        f"{sys.executable} -m stiffdice.cli run {undisturbed.folder}/config/scenes/figure-09.yaml -o /dev/shm/out.h5"
+    )
     done = shell(undisturbed, f"{places} {command}", HOME="/", TMPDIR="", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="")
     assert done.returncode == 2, done.stdout + done.stderr
     assert done.stderr.startswith("stiffdice: compiled kernels: neither /.cache nor a folder for temporary files can")
@@ -163,9 +165,9 @@ NO_MORE = """
 import os, resource
 import numpy as np, xarray as xr
 from stiffdice.errors import StiffdiceError
-from stiffdice.io.read import open_file
-from stiffdice.io.spool import Spool
-from stiffdice.io.write import write_dataset
+from stiffdice.io.reader import open_file
+from stiffdice.io.shard_writer import Spool
+from stiffdice.io.writer import write_dataset
 about = {"units": "1", "long_name": "a number"}
 whole = xr.Dataset({"ratio": (("cell", "member"), np.ones((1, 9)), about)}, attrs={"format_version": "1.0"})
 write_dataset(whole, "in.h5")

@@ -40,7 +40,7 @@ def told(error: InputError, path: Path) -> None:
 
 
 def scenes() -> Reader:
-    from stiffdice import scene
+    from stiffdice.scene import scene
 
     def attempt(data: bytes, _: bytes, folder: Path) -> None:
         path = folder / "scene.yaml"
@@ -58,7 +58,7 @@ def scenes() -> Reader:
 
 def sound_scene(found: object) -> None:
     """State what holds of every scene."""
-    from stiffdice.scene import Scene, from_mapping
+    from stiffdice.scene.scene import Scene, from_mapping
 
     assert isinstance(found, Scene)
     again = from_mapping(json.loads(json.dumps(found.as_mapping())))
@@ -71,7 +71,7 @@ def sound_scene(found: object) -> None:
 
 
 def overrides() -> Reader:
-    from stiffdice import scene
+    from stiffdice.scene import scene
 
     samples = [
         *(b"ground.stiffness=1e6", b"launch.velocity=[1, 2, 3]", b"launch.angular_momentum={seed: 7, low: 0, high: 1}"),
@@ -90,7 +90,7 @@ def overrides() -> Reader:
 
 
 def studies() -> Reader:
-    from stiffdice import study
+    from stiffdice.study import config as study
 
     def attempt(data: bytes, _: bytes, folder: Path) -> None:
         path = folder / "quick.yaml"
@@ -113,8 +113,8 @@ MOST_COLUMNS = 200  # looked at, of a sweep that may have a million
 
 def sound_sweep(sweep: object) -> None:
     """State what holds of every sweep."""
-    from stiffdice import shards
-    from stiffdice.grid import Sweep
+    from stiffdice.sweep import partition
+    from stiffdice.sweep.grid import Sweep
 
     assert isinstance(sweep, Sweep)
     columns = sweep.columns()
@@ -122,7 +122,7 @@ def sound_sweep(sweep: object) -> None:
     sound_scene(sweep.scene_of(columns[0]))
     if len(columns) <= MOST_COLUMNS:
         dealt = [
-            (piece.column, n) for shard in shards.of(sweep).values() for piece in shard.pieces for n in piece.steps
+            (piece.column, n) for shard in partition.of(sweep).values() for piece in shard.pieces for n in piece.steps
         ]
         assert sorted(dealt) == sorted((column, n) for column in columns for n in sweep.scan(column))
     for column in columns[:3]:
@@ -151,7 +151,7 @@ def manifests() -> Reader:
 
 
 def archives() -> Reader:
-    from stiffdice.archive.unzip import unzip
+    from stiffdice.archive.extract import unzip
 
     image = io.BytesIO()
     with zipfile.ZipFile(image, "w", zipfile.ZIP_DEFLATED) as packed:
@@ -211,11 +211,11 @@ def _cleared(folder: Path) -> None:
 
 def _images(folder: Path) -> Iterator[bytes]:
     """Yield files of ours as HDF5 wrote them: a whole one, and one that grew."""
-    from tests.io.test_structure import whole
+    from tests.io.test_structure_check import whole
 
     from stiffdice.io import seal
-    from stiffdice.io.spool import Spool
-    from stiffdice.io.write import write_dataset
+    from stiffdice.io.shard_writer import Spool
+    from stiffdice.io.writer import write_dataset
 
     write_dataset(whole(), folder / "whole.h5")
     given = whole().drop_vars("total")
@@ -231,7 +231,7 @@ def damaged_files(folder: Path) -> Reader:
     import xarray as xr
 
     from stiffdice.io import seal
-    from stiffdice.io.read import open_file
+    from stiffdice.io.reader import open_file
 
     samples = [image + seal.line_of(image) for image in _images(folder)]
     sound = {}
@@ -255,9 +255,9 @@ def damaged_files(folder: Path) -> Reader:
 
 def forged_files(folder: Path) -> Reader:
     """Files whose seal was renewed, in another process first: refused there, or all that reads them gets through."""
-    from stiffdice import inspection
     from stiffdice.io import seal
-    from stiffdice.io.read import open_file, parts
+    from stiffdice.io.reader import open_file, parts
+    from stiffdice.report import file_page
 
     def attempt(data: bytes, _: bytes, folder: Path) -> None:
         path = folder / "x.h5"
@@ -275,8 +275,8 @@ def forged_files(folder: Path) -> Reader:
             return
         for variable in found.variables.values():
             assert variable.attrs["units"]
-        assert inspection.as_text(found, "x.h5")
-        json.loads(inspection.as_json(found))
+        assert file_page.as_text(found, "x.h5")
+        json.loads(file_page.as_json(found))
 
     return Reader(list(_images(folder)), hdf5_blocks.changed, attempt)
 
@@ -288,7 +288,7 @@ class _Tries:
 
 
 def _tried(path: Path) -> InputError | None:
-    from stiffdice.io.quarantine import Child
+    from stiffdice.io.isolation import Child
 
     if _Tries.child is None or _Tries.child.is_gone:
         _Tries.child = Child().__enter__()

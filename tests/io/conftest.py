@@ -2,12 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from stiffdice import frontier, ledger
-from stiffdice.experiments import chatter
-from stiffdice.io.layout import config_attributes, run_dataset
-from stiffdice.io.write import write_dataset
-from stiffdice.scene import from_mapping
-from stiffdice.simulate import simulate
+from stiffdice.experiments import friction_chatter
+from stiffdice.io.writer import write_dataset
+from stiffdice.scene.scene import from_mapping
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.dataset import config_attributes, run_dataset
+from stiffdice.simulation.run import simulate
+from stiffdice.sweep import stability_limits
 
 CHATTER = {"friction": [0.075], "step_size": [1e-6, 1e-4]}
 
@@ -17,14 +18,16 @@ def written(tmp_path_factory, shards, collected):
     """A file of each kind that data are in, as the workflow writes them: kind → path."""
     folder = tmp_path_factory.mktemp("written")
     scene = from_mapping({"launch": {"angular_momentum": [0.1, 0.2, 0.3]}})
-    books = ledger.keep(scene, model="tumbling", scheme="symplectic_euler", steps=3000)
-    run = run_dataset(simulate(scene, steps=3000, every=50)).assign(ledger.variables(books))
-    found = chatter.measure(from_mapping({}), **CHATTER)
+    books = energy_budget.keep(scene, model="tumbling", scheme="symplectic_euler", steps=3000)
+    run = run_dataset(simulate(scene, steps=3000, every=50)).assign(energy_budget.variables(books))
+    found = friction_chatter.measure(from_mapping({}), **CHATTER)
     datasets = {
         "run": run,
         "sweep": collected,
-        "frontier": frontier.find(collected),
-        "experiment": found.assign_attrs(config_attributes("experiment", {"measure": "chatter", "options": CHATTER})),
+        "frontier": stability_limits.find(collected),
+        "experiment": found.assign_attrs(
+            config_attributes("experiment", {"measure": "friction-chatter", "options": CHATTER})
+        ),
     }
     for kind, dataset in datasets.items():
         write_dataset(dataset, folder / f"{kind}.h5")

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiffdice.io import FORMAT_VERSION, schema
-from stiffdice.io.read import open_file
+from stiffdice.io import schema
+from stiffdice.io.attribute_check import FORMAT_VERSION
+from stiffdice.io.reader import open_file
 
 PAGE = (Path(__file__).parents[2] / "docs" / "FORMAT.md").read_text(encoding="utf-8")
 

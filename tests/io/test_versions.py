@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice import inspection
-from stiffdice.io import FORMAT_VERSION, schema
-from stiffdice.io.read import open_file
+from stiffdice.io import schema
+from stiffdice.io.attribute_check import FORMAT_VERSION
+from stiffdice.io.reader import open_file
+from stiffdice.report import file_page
 
 FORMATS = Path(__file__).parents[1] / "reference" / "formats"
 FILES = sorted(FORMATS.glob("*/*.h5"))
@@ -26,8 +27,8 @@ def test_it_is_read(path):
     dataset = open_file(path)
     assert dataset.attrs["format_version"] == path.parent.name
     assert schema.problems(dataset) == []
-    assert dataset.attrs["title"] in inspection.as_text(dataset, path.name)
-    assert inspection.as_json(dataset)
+    assert dataset.attrs["title"] in file_page.as_text(dataset, path.name)
+    assert file_page.as_json(dataset)
 
 
 def test_the_numbers_are_those_that_were_stored():

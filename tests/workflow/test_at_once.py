@@ -5,17 +5,20 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
 import yaml
 from tests.workflow.test_workflow import ROOT, Project
 
-BOOKS = {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}}
+BOOKS = {"measure": "energy-budget", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}}
 pytestmark = pytest.mark.workflow
 
 
@@ -103,6 +106,32 @@ def test_a_study_that_is_being_made_is_not_made_twice_and_nothing_stays_locked(p
     assert call(project, [sys.executable, "workflow/clean.py"]) == (0, "", "")
     assert list((project.folder / "results").iterdir()) == []
     assert not (project.folder / ".snakemake").exists()
+
+
+def test_a_killed_make_takes_its_run_along(project):
+    shutil.copy(ROOT / "Makefile", project.folder)
+    make = start(project, ["make", "-o", "install", "study", "STUDY=many", f"BIN={Path(sys.executable).parent}"])
+    wait_for(lambda: list((project.folder / "results").glob("many/logs/**/*.log")))
+    everything = psutil.Process(make.pid).children(recursive=True)
+    assert len(everything) >= 2  # the run and Snakemake, which by themselves stay as they are
+    for process in everything[:2]:
+        process.suspend()
+    make.kill()
+    _, alive = psutil.wait_procs(everything, timeout=20)
+    for process in alive:
+        process.kill()
+    assert alive == []
+    make.communicate()
+
+
+def test_a_run_goes_on_without_the_shell_that_started_it(project):
+    command = f"{shlex.join(run('few'))} > told 2>&1 & while [ ! -d results/few/logs ]; do sleep 0.1; done"
+    subprocess.run(["sh", "-c", command], cwd=project.folder, env=project.environment, check=True)
+    wait_for(lambda: has_all(project, "books", "more"))
+
+
+def has_all(project: Project, *experiments: str) -> bool:
+    return all((project.folder / f"results/few/experiments/{name}.h5").exists() for name in experiments)
 
 
 def wait_for(found):

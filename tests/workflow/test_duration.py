@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from tests.workflow.test_workflow import ROOT
 
-from stiffdice import job_log, results
-from stiffdice import study as studies
+from stiffdice.study import config as studies
+from stiffdice.study import job_log, outputs
 
 HOUR = timedelta(hours=1)
 
@@ -37,7 +37,7 @@ def study(monkeypatch, tmp_path, request):
 
 
 def of(study, stage):
-    return [result for result in results.of(study) if result.stage == stage]
+    return [result for result in outputs.of(study) if result.stage == stage]
 
 
 def file(study, name):
@@ -47,7 +47,7 @@ def file(study, name):
 
 
 def due(study, *some):
-    return {file(study, result.benchmark).as_posix() for result in some or results.of(study)}
+    return {file(study, result.benchmark).as_posix() for result in some or outputs.of(study)}
 
 
 def run(study, result, begun, *lines, seconds=0.0):

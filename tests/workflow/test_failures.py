@@ -12,7 +12,8 @@ import pytest
 from tests import rounds
 from tests.workflow.test_workflow import Project, planned
 
-from stiffdice import results, shards
+from stiffdice.study import outputs
+from stiffdice.sweep import partition as shards
 
 GRID = {
     "scene": "config/scenes/figure-13.yaml",
@@ -46,7 +47,7 @@ def make(project: Project, most: int = resource.RLIM_INFINITY) -> subprocess.Com
 
 def status(project: Project, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "stiffdice", "status", "tiny", *arguments],
+        [sys.executable, "-m", "stiffdice.cli", "status", "tiny", *arguments],
         cwd=project.folder,
         env=project.environment,
         capture_output=True,
@@ -82,7 +83,7 @@ def test_the_rest_goes_on(failed):
     project, ended = failed
     top, (_, second) = project.folder / "results/tiny", large_shards(project)
     assert ended.returncode == 1
-    made = {file for result in results.of(planned(project)) for file in result.files if (top / file).exists()}
+    made = {file for result in outputs.of(planned(project)) for file in result.files if (top / file).exists()}
     assert made == {
         f"sweeps/large/shards/{second}.h5",
         *(f"sweeps/small/shards/{shard}.h5" for shard in shards.of(planned(project).sweeps["small"])),

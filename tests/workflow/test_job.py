@@ -11,14 +11,15 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice import job_log
+from stiffdice.study import job_log
 
 SCRIPTS = Path(__file__).parents[2] / "workflow" / "scripts"
 # Snakemake puts such an object, and the folder of the script, before what the script says.
 BEFORE = f"""
 import sys, types
 sys.path.insert(0, {str(SCRIPTS)!r})
-snakemake = types.SimpleNamespace(log=sys.argv[1:], params=types.SimpleNamespace(asked="scene 0"))
+snakemake = types.SimpleNamespace(log=sys.argv[1:], output=sys.argv[2:], params=types.SimpleNamespace(asked="scene 0"))
+snakemake.log = snakemake.log[:1]
 from job import logged
 """
 IN_BLOCK = "with logged() as say:\n    "

@@ -14,7 +14,7 @@ from snakemake.iocontainers import Params
 from snakemake.logging import format_dict
 from snakemake.report.html_reporter.data import render_results
 
-from stiffdice.study import PlannedFigure
+from stiffdice.study.config import PlannedFigure
 
 CAPTIONS = Path(__file__).parents[2] / "workflow" / "report"
 TITLES = [

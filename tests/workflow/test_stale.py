@@ -72,7 +72,7 @@ def change(project, name, before, after):
 
 
 def stiffdice(project, *arguments):
-    command = [sys.executable, "-m", "stiffdice", *arguments]
+    command = [sys.executable, "-m", "stiffdice.cli", *arguments]
     return subprocess.run(
         command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
     )
@@ -135,6 +135,12 @@ def test_another_study_is_run_though_snakemake_forgot(copied, before, after, due
     assert copied.jobs_due() == due
 
 
+def test_every_round_is_run_at_once_where_all_are_stale(copied):
+    shutil.rmtree(copied.folder / "results/tiny/logs/shard")
+    shutil.rmtree(copied.folder / "results/tiny/logs/survey")
+    assert copied.jobs_due() == SWEPT
+
+
 def test_the_same_study_is_not_run_though_snakemake_forgot(copied):
     forget(copied)
     for path in (copied.folder / "config").rglob("*.yaml"):
@@ -188,6 +194,58 @@ def test_what_is_stale_is_told_refused_and_made_again(copied):
     assert copied.jobs_due() == {}
     assert stiffdice(copied, "status", "tiny").returncode == 0
     assert stiffdice(copied, "verify", "results/tiny").returncode == 0
+
+
+def swapped(project):
+    """Put a whole file of another result in the place of one of each kind, as old as that; return which."""
+    top = project.folder / "results/tiny"
+    shard = (top / "sweeps/steps/shards.csv").read_text().splitlines()[1].split(",")[0]  # of the first round
+    data, shown = top / "runs/turn.as_listed.h5", top / "figures/books.svg"
+    files = {
+        "runs/stiff.as_listed.h5": data,
+        "experiments/books.h5": data,
+        "benchmarks/timings/work.h5": data,
+        f"sweeps/steps/shards/{shard}.h5": data,
+        "sweeps/steps/surveys/0.h5": data,
+        "sweeps/steps/sweep.h5": data,
+        "sweeps/steps/frontier.csv": top / "tables/answers.csv",
+        "figures/position.svg": shown,
+        "figures/movie.gif": top / "figures/books.png",
+        "tables/answers.md": shown,
+    }
+    for name, other in files.items():
+        stat = (top / name).stat()
+        shutil.copyfile(other, top / name)
+        os.utime(top / name, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    return list(files)
+
+
+def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp_path):
+    names = swapped(copied)
+    told = stiffdice(copied, "status", "tiny")
+    assert told.returncode == 3
+    assert "10 stale" in told.stdout
+    assert "figure position  its .svg is not what its job made: another file in its place, or changed" in told.stdout
+    more = {"shard": 1, "trajectory": 1, "experiment": 1, "timing": 1, "figure": 3, "animation": 1}
+    assert copied.jobs_due() == SWEPT | more
+    for folder in ("results/tiny", str(shutil.copytree(copied.folder / "results/tiny", tmp_path / "elsewhere"))):
+        told = stiffdice(copied, "verify", folder)
+        assert told.returncode == 1
+        failing = [line for line in told.stdout.splitlines() if "not what its job made" in line]
+        assert len(failing) == len(names)
+
+
+def test_a_figure_that_was_touched_up_is_set_aside_and_made_again(copied):
+    figure = copied.folder / "results/tiny/figures/position.png"
+    before = figure.read_bytes()
+    figure.write_bytes(b"touched up")
+    done = copied.snakemake()
+    assert done.returncode == 0, done.stderr
+    line = "results/tiny/figures/position.png: not what its job made: another file in its place, or changed by hand; "
+    assert f"stiffdice: {line}set aside as position.png.damaged, and made again\n" in done.stderr
+    assert figure.read_bytes() == before
+    assert figure.with_name("position.png.damaged").read_bytes() == b"touched up"
+    assert copied.jobs_due() == {}
 
 
 def test_a_log_that_is_gone_tells_nothing(copied):

@@ -19,12 +19,12 @@ import yaml
 from PIL import Image
 from tests import rounds
 
-from stiffdice import shards, sweep
-from stiffdice import study as studies
-from stiffdice.io import FORMAT_VERSION
-from stiffdice.io.read import open_file, parts
-from stiffdice.scene import load
-from stiffdice.simulate import simulate
+from stiffdice.io.attribute_check import FORMAT_VERSION
+from stiffdice.io.reader import open_file, parts
+from stiffdice.scene.scene import load
+from stiffdice.simulation.run import simulate
+from stiffdice.study import config as studies
+from stiffdice.sweep import partition, sweep
 
 ROOT = Path(__file__).parent.parent.parent
 WORK = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml", "set": ["duration=3"]}
@@ -45,17 +45,21 @@ TINY = {
         },
     },
     "experiments": {
-        "books": {"measure": "ledger", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}},
+        "books": {
+            "measure": "energy-budget",
+            "scene": "config/scenes/figure-09.yaml",
+            "options": {"steps": [10000, 20000]},
+        },
         "work": {**WORK, "options": {**FEW, "steps": 1e5}},
     },
     "timings": {"work": {**WORK, "options": {**FEW, "affordable": 0.01, "rounds": 1}}},
     "figures": {
         "position": {"draw": "position", "run": "stiff", "title": "Position"},
         "frontier": {"draw": "frontier", "of": ["steps"], "title": "Frontier"},
-        "books": {"draw": "ledger", "of": ["books"], "title": TITLE},
+        "books": {"draw": "energy-budget", "of": ["books"], "title": TITLE},
         "times": {"draw": "work-precision", "of": ["work"], "timings": ["work"], "title": "Times"},
     },
-    "tables": {"answers": {"tell": "answers", "of": ["steps"], "title": "Answers"}},
+    "tables": {"answers": {"tell": "paper-questions", "of": ["steps"], "title": "Answers"}},
 }
 # What two rebuilds share: all but times, and the figures that show them.
 DATA = ("runs/*.h5", "sweeps/**/*.h5", "sweeps/**/*.csv", "experiments/*.h5", "tables/*", "figures/[!t]*")
@@ -191,7 +195,7 @@ def test_a_table_maps_the_shards_names_back(finished):
     with (finished.folder / "results/tiny/sweeps/steps/shards.csv").open() as file:
         rows = list(csv.DictReader(file))
     plan = planned(finished).sweeps["steps"]
-    assert {row["shard"] for row in rows} == set(shards.of(plan))
+    assert {row["shard"] for row in rows} == set(partition.of(plan))
     assert sum(int(row["cells"]) for row in rows) == sum(len(plan.scan(column)) for column in plan.columns())
 
 
@@ -206,12 +210,12 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
 
 @pytest.mark.long
 def test_a_changed_style_redraws_only(finished, edited):
-    edited("src/stiffdice/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
+    edited("src/stiffdice/report/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
     assert finished.jobs_due() == {"figure": 4}
 
 
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
-    edited("src/stiffdice/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
+    edited("src/stiffdice/dynamics/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
     runs = {"shard": 2, "trajectory": 2, "experiment": 2, "timing": 1}
     everything = runs | {"collect": 1, "frontier": 1, "figure": 4, "table": 1}
     assert finished.jobs_due() == everything
@@ -219,7 +223,7 @@ def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
 
 @pytest.mark.long
 def test_a_changed_analysis_computes_no_run_again(finished, edited):
-    edited("src/stiffdice/frontier.py", lambda text: text + "\n")
+    edited("src/stiffdice/sweep/stability_limits.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"frontier": 1, "figure": 1, "table": 1}
 
 
@@ -236,7 +240,7 @@ def test_a_changed_scene_of_the_sweep_is_swept_again(finished, edited):
 
 @pytest.mark.long
 def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
-    edited("src/stiffdice/ensemble.py", lambda text: text + "\n")
+    edited("src/stiffdice/simulation/initial_conditions.py", lambda text: text + "\n")
     assert finished.jobs_due() == AGAIN
 
 
@@ -272,7 +276,7 @@ def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
 
 @pytest.mark.long
 def test_a_changed_drawing_draws_its_figure_only(finished, edited):
-    edited("src/stiffdice/figures/ledger.py", lambda text: text + "\n")
+    edited("src/stiffdice/report/figures/energy_budget.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"figure": 1}
 
 

@@ -6,10 +6,15 @@ import time
 from functools import cache
 from pathlib import Path
 
-from stiffdice import asked, results, shards
-from stiffdice import study as studies
-from stiffdice.catalogue import DRAWINGS, TABLES
-from stiffdice.errors import InputError
+from stiffdice.cli.progress import told_if_slow
+from stiffdice.errors import InputError, printable
+from stiffdice.study import config as studies
+from stiffdice.study import job_log
+from stiffdice.study import output_digest as made
+from stiffdice.study import outputs as results
+from stiffdice.study import provenance as asked
+from stiffdice.study.catalogue import DRAWINGS, TABLES
+from stiffdice.sweep import partition as shards
 
 SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 BEGUN = time.time()
@@ -35,14 +40,27 @@ wildcard_constraints:
 def study(name):
     """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
     try:
-        return studies.load(f"config/{name}.yaml", SCHEMA)
+        with told_if_slow(f"reading config/{name}.yaml"):
+            return studies.load(f"config/{name}.yaml", SCHEMA)
     except InputError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         sys.exit(2)
 
 
 @cache
+def planned_results(name):
+    """Return all results of a study; a link to nothing in the place of one ends Snakemake with exit status 2."""
+    with told_if_slow(f"planning the sweeps of {name}"):
+        found = results.of(study(name))
+    for line in filter(None, (results.dangling(result, Path("results", name)) for result in found)):
+        print(f"stiffdice: {printable(line)}", file=sys.stderr)
+        sys.exit(2)
+    return found
+
+
+@cache
 def asked_by(name):
+    planned_results(name)
     return asked.of(study(name))
 
 
@@ -128,6 +146,16 @@ def survey_files(wildcards, rounds):
     return [f"{top}/{number}.h5" for number in range(rounds - 1)]
 
 
+def survey_of_shard(wildcards):
+    """Return the survey that says where the cells of a later round's shard lie, `ancient` unless the shard is stale.
+
+    Of what depends by ancient files alone on a job that is due, Snakemake does not ask whether it is due itself.
+    """
+    files = survey_files(wildcards, shard_of(wildcards).round + 1)[-1:]
+    shard = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/shards/{wildcards.shard}.h5"
+    return files if workflow.is_main_process and shard in stale_files(wildcards.study) else ancient(files)
+
+
 # Where the files of each kind are. Times are apart, with the other files that no two rebuilds share.
 PLACES = {
     "sweeps": "sweeps/{}/frontier.h5",
@@ -211,6 +239,35 @@ def one_at_a_time():
         sys.exit(2)
 
 
+def clear_way():
+    """Remove what is in the way of logs and benchmarks; what stays ends Snakemake with one line and exit status 2."""
+    import room
+
+    jobs = list(workflow.dag.needrun_jobs())
+    try:
+        room.clear_way(Path(file) for job in jobs for file in (*job.log, *([job.benchmark] if job.benchmark else [])))
+    except room.RoomError as error:
+        print(f"stiffdice: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def set_aside_changed():
+    """Keep, as NAME.damaged, what took the place of what a job made, before Snakemake removes it to make that again."""
+    for name in {*jobs_due().values()}:
+        top = Path("results", name)
+        for result in asked.stale(asked_by(name), top):
+            told = job_log.read(top / result.log)
+            if told is None or f"{top}/{result.benchmark}" not in jobs_due():
+                continue
+            for file in made.changed(told, top, *(file for file in result.files if file in told.made)):
+                (top / file).rename(top / f"{file}.damaged")
+                print(
+                    f"stiffdice: {top}/{file}: not what its job made: another file in its place, or changed by hand; "
+                    f"set aside as {Path(file).name}.damaged, and made again",
+                    file=sys.stderr,
+                )
+
+
 def tell_how_long():
     """Say about how long it takes, and then what is left; of a cluster, whose jobs queue, and of no job, nothing."""
     if on_cluster() or workflow.touch or not jobs_due():
@@ -230,7 +287,7 @@ def tell_left_out(name):
 def everything_of(name):
     """Return all results of a study; what needs an engine that is not installed is left out, with a line."""
     tell_left_out(name)
-    return [f"results/{name}/{file}" for result in results.of(study(name)) for file in result.files]
+    return [f"results/{name}/{file}" for result in planned_results(name) for file in result.files]
 
 
 # A mistake in the study asked for is told before anything else is said.

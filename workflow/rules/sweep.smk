@@ -6,7 +6,7 @@
 rule shard:
     input:
         not_stale,
-        survey=lambda wildcards: ancient(survey_files(wildcards, shard_of(wildcards).round + 1)[-1:]),
+        survey=survey_of_shard,
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:

@@ -8,9 +8,9 @@ import xarray as xr
 from inputs import Inputs, Say, opened
 from job import logged
 
-from stiffdice import shards, sweep
-from stiffdice.io.read import parts
-from stiffdice.io.write import write_bytes, write_dataset
+from stiffdice.io.reader import parts
+from stiffdice.io.writer import write_bytes, write_dataset
+from stiffdice.sweep import partition, sweep
 
 snakemake: Any  # Snakemake puts it here
 
@@ -27,10 +27,10 @@ def row(name: str, number: int, members: int, stiffness: list[float], steps: lis
 
 def checked(say: Say) -> Iterator[xr.Dataset]:
     """Read one shard after another, part by part, and note what is in it; one that is not as planned is refused."""
-    plan, inputs = shards.of(asked), Inputs(say)
+    plan, inputs = partition.of(asked), Inputs(say)
     surveys = opened(((Path(path).stem, path) for path in snakemake.input.surveys), say)
     later = {
-        int(number) + 1: shards.later(asked, survey, int(number) + 1, len(shards.rounds(plan, int(number) + 1)))
+        int(number) + 1: partition.later(asked, survey, int(number) + 1, len(partition.rounds(plan, int(number) + 1)))
         for number, survey in surveys.items()
     }
     for path in snakemake.input.shards:

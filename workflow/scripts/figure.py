@@ -5,7 +5,7 @@ from typing import Any
 from inputs import opened
 from job import logged
 
-from stiffdice import figures
+from stiffdice.report.figures import registry as figures
 
 snakemake: Any  # Snakemake puts it here
 

@@ -10,7 +10,7 @@ import job  # noqa: F401 (which says where the library is)
 import xarray as xr
 
 from stiffdice.errors import RefusedError
-from stiffdice.io.read import open_file
+from stiffdice.io.reader import open_file
 
 Say = Callable[[str], None]
 

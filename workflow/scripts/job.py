@@ -17,10 +17,10 @@ from typing import NoReturn
 # The library of this checkout, installed or not: the one whose digest the workflow computed.
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
 
-from stiffdice import job_log
 from stiffdice.errors import StiffdiceError
-from stiffdice.io.write import clear
-from stiffdice.parent import end_with_parent
+from stiffdice.io.writer import clear
+from stiffdice.study import job_log, output_digest
+from stiffdice.study.process import end_with_parent
 
 end_with_parent("snakemake")
 
@@ -49,7 +49,9 @@ class _Log:
             os.write(self._file, f"{text}\n".encode())
 
     def done(self) -> None:
-        """Write the last line of a job that ended well."""
+        """Write the last lines of a job that ended well: what it made, and how long it took."""
+        for output in map(Path, sys.modules["__main__"].snakemake.output):
+            self.say(job_log.made(Path(*output.parts[2:]).as_posix(), output_digest.digest_of(output)))
         self.say(job_log.done(time.monotonic() - self._begun))
 
     def end(self, error: BaseException) -> NoReturn:

@@ -4,11 +4,11 @@ from typing import Any
 
 from job import Stopwatch, logged
 
-from stiffdice import scene as scenes
-from stiffdice.catalogue import EXPERIMENTS, TIMINGS
 from stiffdice.errors import InputError
-from stiffdice.io.layout import config_attributes
-from stiffdice.io.write import write_dataset
+from stiffdice.io.writer import write_dataset
+from stiffdice.scene import scene as scenes
+from stiffdice.simulation.dataset import config_attributes
+from stiffdice.study.catalogue import EXPERIMENTS, TIMINGS
 
 snakemake: Any  # Snakemake puts it here
 

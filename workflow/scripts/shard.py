@@ -6,18 +6,19 @@ from typing import Any
 from inputs import opened
 from job import Stopwatch, logged, tenths
 
-from stiffdice import job_log, shards, sweep
-from stiffdice.kept import Kept
+from stiffdice.study import job_log
+from stiffdice.sweep import partition, sweep
+from stiffdice.sweep.reuse import Kept
 
 snakemake: Any  # Snakemake puts it here
 
 with logged() as say:
     planned, target = snakemake.params.sweep, Path(snakemake.output[0])
-    plan = shards.of(planned)
+    plan = partition.of(planned)
     number, part, parts, _, pieces = plan[target.stem]
     if number:
         survey = opened([("survey", snakemake.input[0])], say)["survey"]
-        pieces = shards.later(planned, survey, number, parts)[part]
+        pieces = partition.later(planned, survey, number, parts)[part]
     kept = Kept(planned, pieces, target.parent, plan, say)
     watch = Stopwatch()
     with watch.running():

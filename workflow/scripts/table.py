@@ -5,8 +5,8 @@ from typing import Any
 from inputs import opened
 from job import logged
 
-from stiffdice.catalogue import TABLES
-from stiffdice.io.write import write_bytes
+from stiffdice.io.writer import write_bytes
+from stiffdice.study.catalogue import TABLES
 
 snakemake: Any  # Snakemake puts it here
 

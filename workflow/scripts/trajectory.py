@@ -4,12 +4,12 @@ from typing import Any
 
 from job import Stopwatch, logged
 
-from stiffdice import ledger
-from stiffdice import scene as scenes
-from stiffdice.io.layout import run_dataset
-from stiffdice.io.write import write_dataset
-from stiffdice.simulate import simulate
-from stiffdice.simulators import OURS
+from stiffdice.io.writer import write_dataset
+from stiffdice.scene import scene as scenes
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.backend import OURS
+from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.run import simulate
 
 snakemake: Any  # Snakemake puts it here
 
@@ -27,8 +27,8 @@ with logged() as say:
             every=planned.every,
         )
         dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
-        if planned.simulator == OURS and planned.scheme in ledger.BOOKED:
-            books = ledger.keep(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
-            dataset = dataset.assign(ledger.variables(books))
+        if planned.simulator == OURS and planned.scheme in energy_budget.BOOKED:
+            books = energy_budget.keep(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
+            dataset = dataset.assign(energy_budget.variables(books))
     write_dataset(dataset, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from stiffdice.errors import InputError
-from stiffdice.io import yaml_file
+from stiffdice.io import yaml_loader
 
 _NEEDED = ("title", "version", "date-released", "license", "authors")
 
@@ -37,7 +37,7 @@ class Citation(NamedTuple):
     @classmethod
     def load(cls, path: Path) -> Citation:
         """Return what the file says; raises InputError naming the file and the key that is missing."""
-        data = yaml_file.load(path)
+        data = yaml_loader.load(path)
         for key in _NEEDED:
             if not isinstance(data, dict) or key not in data:
                 raise InputError(f"{path}: {key} is missing")

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiffdice import asked, results
-from stiffdice.errors import InputError, RefusedError
-from stiffdice.io import FORMAT_VERSION, yaml_file
-from stiffdice.io.read import open_file
-from stiffdice.study import Study
+from stiffdice.errors import InputError
+from stiffdice.io import yaml_loader
+from stiffdice.io.reader import open_file
+from stiffdice.study import outputs, provenance
+from stiffdice.study.config import Study
 
 # By their names; the order is that of every list of sizes.
 KINDS = {
@@ -52,7 +52,7 @@ class File(NamedTuple):
     path: str
     kind: str
     source: Path
-    result: results.Result | None = None
+    result: outputs.Result | None = None
 
 
 class Found(NamedTuple):
@@ -83,7 +83,7 @@ def scenes_of(study: str, root: Path) -> list[str]:
     """Return the scenes that config/STUDY.yaml names, relative to the project; raises InputError for one outside."""
     path = f"config/{study}.yaml"
     found: dict[str, None] = {}
-    data: Mapping[str, Any] = yaml_file.load(root / path)
+    data: Mapping[str, Any] = yaml_loader.load(root / path)
     for kind in ("runs", "sweeps", "experiments", "timings"):
         for name, part in data.get(kind, {}).items():
             scene = os.path.normpath(part["scene"])
@@ -97,23 +97,13 @@ def scenes_of(study: str, root: Path) -> list[str]:
 
 
 def read(files: list[File]) -> Found:
-    """Read every HDF5 file and return what the data say.
-
-    Raises RefusedError naming the first that is not whole, InputError naming one of an earlier format.
-    """
+    """Read every HDF5 file and return what the data say; raises RefusedError naming the first that is not whole."""
     runs: dict[str, int] = {}
     software: set[tuple[str, str]] = set()
     for file in files:
-        if file.result is None:
-            continue
-        if file.source.stat().st_size == 0:
-            raise RefusedError(f"{file.path}: empty; remove it and make it again")
-        if file.source.suffix != ".h5":
+        if file.result is None or file.source.suffix != ".h5":
             continue
         dataset = open_file(file.source)
-        version = dataset.attrs["format_version"]
-        if version != FORMAT_VERSION:
-            raise InputError(f"{file.path}: of format {version}, made by earlier code; run the study again first")
         if file.result.stage == "shard":
             runs[file.path] = dataset.sizes["cell"] * dataset.sizes["member"]
         software.update(_software(dataset.attrs))
@@ -136,9 +126,9 @@ def _project(root: Path) -> Iterator[File]:
         if not (root / path).is_file():
             raise InputError(f"{path}: not here; an archive is made in the project's folder")
         yield File(path, kind, root / path)
-    for tree, kind in _TREES.items():
-        yield from _tree(root, tree, kind)
-    for file in _tree(root, "docs", "about"):
+    for top, kind in _TREES.items():
+        yield from tree(root, top, kind)
+    for file in tree(root, "docs", "about"):
         if file.path.endswith(".md"):
             yield file
 
@@ -148,13 +138,13 @@ def _config(study: str, root: Path) -> Iterator[File]:
         if (root / path).is_symlink():
             raise InputError(f"{path}: a link; an archive holds files only")
         yield File(path, "config", root / path)
-    for file in _tree(root, "config", "config"):
+    for file in tree(root, "config", "config"):
         # Somebody's own; Git leaves them out, too.
         if not file.path.startswith("config/my-") or file.path == f"config/{study}.yaml":
             yield file
 
 
-def _tree(root: Path, top: str, kind: str) -> Iterator[File]:
+def tree(root: Path, top: str, kind: str) -> Iterator[File]:
     """Yield the files in a folder of the project and below it; raises InputError for a link among them."""
     if not (root / top).is_dir():
         raise InputError(f"{top}: not here; an archive is made in the project's folder")
@@ -176,23 +166,23 @@ def _is_left_out(name: str) -> bool:
 
 def _results(study: Study, root: Path) -> Iterator[File]:
     top = f"results/{study.name}"
-    planned = [(f"{top}/{path}", result) for result in results.of(study) for path in result.files]
+    planned = [(f"{top}/{path}", result) for result in outputs.of(study) for path in result.files]
     missing = [path for path, _ in planned if not (root / path).is_file()]
     if missing:
         raise InputError(
             f"{missing[0]}: not there, as {len(missing)} of {len(planned)} files of this study; "
             f"make study STUDY={study.name} makes what is missing"
         )
-    stale = asked.stale(asked.of(study, root), root / top)
+    stale = provenance.stale(provenance.of(study, root), root / top)
     if stale:
         first, reason = next(iter(stale.items()))
         raise InputError(
-            f"{top}/{first.files[0]}: {reason}, as {len(stale)} of {len(results.of(study))} results of this study; "
+            f"{top}/{first.files[0]}: {reason}, as {len(stale)} of {len(outputs.of(study))} results of this study; "
             f"make study STUDY={study.name} makes them again"
         )
     for path, result in planned:
         yield File(path, _kind(path, result), root / path, result)
-    for result in results.of(study):
+    for result in outputs.of(study):
         for side in (f"{top}/{result.log}", f"{top}/{result.benchmark}"):
             if (root / side).is_file():
                 yield File(side, "logs", root / side)
@@ -200,7 +190,7 @@ def _results(study: Study, root: Path) -> Iterator[File]:
         yield File(f"{top}/report.html", "report", root / top / "report.html")
 
 
-def _kind(path: str, result: results.Result) -> str:
+def _kind(path: str, result: outputs.Result) -> str:
     if result.stage in {"figure", "animation", "table"}:
         return "figures"
     return "logs" if result.stage == "timings" else "data"

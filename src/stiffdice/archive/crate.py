@@ -20,8 +20,9 @@ from stiffdice.archive.citation import Author, Citation
 from stiffdice.archive.contents import KINDS, File
 from stiffdice.archive.sizes import Sizes, sentence
 from stiffdice.errors import RefusedError
-from stiffdice.results import Result
-from stiffdice.study import Study
+from stiffdice.study.config import Study
+from stiffdice.study.eta import took
+from stiffdice.study.outputs import Result
 
 NAME = "ro-crate-metadata.json"
 
@@ -111,10 +112,10 @@ def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
         if file.kind != "logs" or file.source.suffix != ".tsv":
             continue
         end = file.source.stat().st_mtime
-        try:
-            begun.append(end - float(file.source.read_text(encoding="utf-8").splitlines()[1].split("\t")[0]))
-        except (IndexError, ValueError):
-            raise RefusedError(f"{file.path}: not a benchmark of Snakemake; remove it") from None
+        seconds = took(file.source)
+        if seconds is None:
+            raise RefusedError(f"{file.path}: not a benchmark of Snakemake; remove it")
+        begun.append(end - seconds)
         ended.append(end)
     if not ended or datetime.fromtimestamp(min(ended), UTC).year <= 1980:
         return None

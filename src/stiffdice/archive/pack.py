@@ -14,8 +14,8 @@ from stiffdice.archive import contents, crate, manifest, preview
 from stiffdice.archive.citation import Citation
 from stiffdice.archive.sizes import Size, Sizes, sum_of
 from stiffdice.errors import InputError
-from stiffdice.io.write import check_target, whole
-from stiffdice.study import Study
+from stiffdice.io.writer import check_target, whole
+from stiffdice.study.config import Study
 
 # What WorkflowHub knows a crate by; zip programs go by the last part of it.
 SUFFIX = ".crate.zip"

@@ -1,15 +1,13 @@
 """An archive made again from its own content, and compared with what it holds.
 
-This executes code of the archive: its Snakefile, its scripts, its library. `verify` does not.
+`verify` executes nothing of an archive. This does, unless its code is the installed code: `opened` says which it is,
+before anything is executed.
 """
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -18,28 +16,39 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import NamedTuple
 
-from stiffdice import catalogue
-from stiffdice import study as studies
-from stiffdice.archive import manifest
-from stiffdice.archive.unzip import unzip
+from stiffdice import __version__
+from stiffdice.archive import installed, manifest, sandbox
+from stiffdice.archive.compare.compare import compare
+from stiffdice.archive.extract import unzip
+from stiffdice.archive.installed import Code
+from stiffdice.archive.sandbox import Way
 from stiffdice.archive.verify import verify
-from stiffdice.diff import compare
-from stiffdice.errors import InputError, RefusedError, StiffdiceError, printable
-from stiffdice.io import yaml_file
+from stiffdice.errors import InputError, OutputError, RefusedError, StiffdiceError, printable
+from stiffdice.io import yaml_loader
+from stiffdice.io.text_file import LARGEST_TABLE, text_of
+from stiffdice.study import catalogue
+from stiffdice.study import config as studies
 
 LAST_LINES = 20  # of a run that failed, to show
+
+# In the folder of a rebuild: the archive, out of a sandbox's sight; what runs and what it makes; what the run says.
+ARCHIVED, REBUILT, LOG = "archived", "rebuilt", "rebuild.log"
 
 # Under results/STUDY/: what no two runs share.
 _SIDE = ("logs/", "benchmarks/", "report.html")
 
-_NOWHERE = "http://127.0.0.1:9"
+# What the installed code is given of an archive: files that Python cannot import.
+_READ = (".yaml", ".yml", ".json")
+
+_LOG_READ = 1 << 20  # bytes at the end of a log
 
 Tell = Callable[[str], None]
 
 
 class RunError(StiffdiceError):
-    """The run of an archive's own workflow failed; told with its last lines, each `printable`."""
+    """The run of an archive's workflow failed; told with its last lines, each `printable`."""
 
     def __init__(self, message: str, last: Sequence[str]) -> None:
         super().__init__(message)
@@ -49,17 +58,33 @@ class RunError(StiffdiceError):
         return "\n  ".join([super().__str__(), *self._last])
 
 
+class Opened(NamedTuple):
+    """An unpacked archive that passes every check, of which nothing was executed.
+
+    folder: where it lies and is made again; kept: whether it stays. listed: digests of its files, by path. code: what
+    its code is beside the installed.
+    """
+
+    archive: str
+    folder: Path
+    kept: bool
+    study: str
+    listed: Mapping[str, str]
+    code: Code
+
+
 @dataclass
 class Rebuilt:
     """What came of it.
 
-    folder: where it lies, if it was kept. same: files that are equal byte by byte. equal: files of equal numbers in
-    other bytes. different: by file, what differs. left_out: files that no two runs share: logs, times, and what shows
-    times. notes: what may explain a difference.
+    folder: where it lies, if it was kept. by: what code made it again. same: files that are equal byte by byte. equal:
+    files of equal numbers in other bytes. different: by file, what differs. left_out: files that no two runs share:
+    logs, times, and what shows times. notes: what may explain a difference, and what equality does not say.
     """
 
     archive: str
     study: str
+    by: str
     folder: str | None = None
     same: list[str] = field(default_factory=list)
     equal: list[str] = field(default_factory=list)
@@ -69,66 +94,108 @@ class Rebuilt:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing differs."""
-        return not self.different
+        """Whether something was compared, and nothing differs."""
+        return bool(self.same or self.equal) and not self.different
 
     def lines(self) -> list[str]:
         """Return it for people: how much is the same, a line for all that differs, and what may explain it."""
         lines = [
-            f"{self.archive}: the study {self.study}, made again: {len(self.same)} files are the same to the last bit, "
-            f"{len(self.different)} differ; {len(self.left_out)} hold or show times and are not compared"
+            f"{self.archive}: the study {self.study}, made again by {self.by}: {len(self.same)} files are the same to "
+            f"the last bit, {len(self.different)} differ; {len(self.left_out)} hold or show times and are not compared"
         ]
         lines += [f"the same numbers in other bytes: {name}" for name in self.equal]
         lines += [f"DIFFERS: {name}: {reason}" for name, reasons in self.different.items() for reason in reasons]
         lines += [f"note: {note}" for note in self.notes]
         if self.folder is not None:
-            lines.append(f"it lies in {self.folder}; what was archived in its folder {ARCHIVED}")
+            lines.append(f"it lies in {self.folder}: the archive in {ARCHIVED}, what was made again in {REBUILT}")
         return [printable(line) for line in lines]
 
 
-# Beside the new results: those of the archive.
-ARCHIVED = "archived"
+@contextmanager
+def opened(archive: str | Path, folder: str | Path | None = None, tell: Tell = lambda text: None) -> Iterator[Opened]:
+    """Unpack and check an archive, and compare its code with the installed; nothing of it is executed.
 
-
-def rebuild(
-    archive: str | Path, folder: str | Path | None = None, cores: int = 1, tell: Tell = lambda text: None
-) -> Rebuilt:
-    """Check an archive, run its own workflow on its own code, without a network, and compare the results with its own.
-
-    folder: where to unpack and run it, new or empty, and to leave it there; None takes a temporary one. The Python and
-    the libraries are those of this process; HOME and caches lie in the folder. tell: called with what is done next.
-    Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be read, and RunError with the
-    run's last lines if that fails.
+    folder: where to unpack it and make it again, new or empty, and to leave it there; None takes a temporary one. tell:
+    called with what is done next. Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be
+    read; nothing is left then, but of a run that failed.
     """
     with _place(folder) as place:
         tell("unpacking")
-        unzip(archive, place)
+        unzip(archive, place / ARCHIVED)
+        tell("checking")
+        listed = _checked(archive, place / ARCHIVED)
+        study = _study_of(archive, listed)
+        yield Opened(
+            str(archive), place, folder is not None, study, listed, installed.compared(place / ARCHIVED, listed)
+        )
+
+
+def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
+    """Return how an archive is made again; raises RefusedError if other code than the installed lacks its sandbox.
+
+    The installed code is as good outside of one; it has the sandbox where there is one, for no network and an end.
+    """
+    (unpacked.folder / REBUILT).mkdir(exist_ok=True)
+    if in_sandbox:
         try:
-            tell("checking")
-            listed = _checked(archive, place)
-            rebuilt = Rebuilt(str(archive), _study_of(archive, listed), None if folder is None else str(folder))
-        except StiffdiceError:
-            shutil.rmtree(place)
-            raise
-        rebuilt.notes += other_versions(place / "requirements" / "requirements.lock")
-        top = f"results/{rebuilt.study}"
-        (place / ARCHIVED).mkdir()
-        (place / top).rename(place / ARCHIVED / rebuilt.study)
-        results = {name: digest for name, digest in listed.items() if name.startswith(f"{top}/")}
-        log = _run(rebuilt, place, cores, list(results), tell)
-        rebuilt.notes += [line for line in log if "left out:" in line]
-        _compare(rebuilt, place, results)
-        return rebuilt
+            return sandbox.sandboxed(unpacked.folder / REBUILT)
+        except RefusedError as error:
+            if not unpacked.code.is_installed:
+                raise RefusedError(
+                    f"{unpacked.archive}: {unpacked.code}; that is not run here: {error}; --no-sandbox would let it do "
+                    "whatever you can"
+                ) from None
+    return sandbox.unconfined(unpacked.folder / REBUILT)
+
+
+def rebuild(unpacked: Opened, way: Way, cores: int = 1, tell: Tell = lambda text: None) -> Rebuilt:
+    """Make the results of an archive again, where there are none, and compare them with the archive's own.
+
+    It executes the archive's own code, unless that is the installed. Python and libraries are those of this process.
+    Raises RunError with the run's last lines if that fails.
+    """
+    ours = unpacked.code.is_installed
+    by = f"the installed code, stiffdice {__version__}" if ours else "the archive's own code, not the installed"
+    rebuilt = Rebuilt(unpacked.archive, unpacked.study, by, str(unpacked.folder) if unpacked.kept else None)
+    rebuilt.notes += other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
+    _fill(unpacked)
+    results = {
+        name: digest for name, digest in unpacked.listed.items() if name.startswith(f"results/{unpacked.study}/")
+    }
+    said = _run(unpacked, way, cores, list(results), tell)
+    rebuilt.notes += [line for line in said if "left out:" in line]
+    _compare(rebuilt, unpacked.folder, results)
+    if not rebuilt.same and not rebuilt.equal and not rebuilt.different:
+        rebuilt.notes.append("there was nothing to compare")
+    if not ours:
+        rebuilt.notes.append(f"{unpacked.code}; equal files say that its own code gives them, not what this computes")
+    if not ours and way.could:
+        rebuilt.notes.append(f"it ran {way}, and could have copied the archive's results")
+    return rebuilt
 
 
 @contextmanager
 def _place(folder: str | Path | None) -> Iterator[Path]:
-    """Give a folder to unpack into, which is not there yet or empty."""
-    if folder is not None:
-        yield Path(folder)
+    """Give an empty folder; a temporary one is gone afterwards, another if anything but the run fails."""
+    if folder is None:
+        with tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True) as temporary:
+            yield Path(temporary)
         return
-    with tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True) as temporary:
-        yield Path(temporary) / "archive"
+    place = Path(folder)
+    try:
+        place.mkdir(mode=0o700, exist_ok=True)
+        is_empty = not any(place.iterdir())
+    except OSError as error:
+        raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
+    if not is_empty:
+        raise OutputError(f"{place}: is not empty; name a new folder")
+    try:
+        yield place
+    except RunError:
+        raise
+    except BaseException:
+        shutil.rmtree(place, ignore_errors=True)
+        raise
 
 
 def _checked(archive: str | Path, place: Path) -> dict[str, str]:
@@ -160,7 +227,7 @@ def other_versions(lock: Path) -> list[str]:
         return ["no requirements/requirements.lock: it is not known which versions made it"]
     found = []
     pinned = re.findall(
-        r"^([A-Za-z0-9][A-Za-z0-9._-]*)==([^\s;\\]+)(?: *;[^\n]*)?", lock.read_text("utf-8"), re.MULTILINE
+        r"^([A-Za-z0-9][A-Za-z0-9._-]*)==([^\s;\\]+)(?: *;[^\n]*)?", text_of(lock, LARGEST_TABLE), re.MULTILINE
     )
     for name, locked in pinned:
         try:
@@ -172,94 +239,67 @@ def other_versions(lock: Path) -> list[str]:
     return found
 
 
-def _run(rebuilt: Rebuilt, place: Path, cores: int, expected: list[str], tell: Tell) -> list[str]:
-    """Run the archive's own workflow and return what it said; raises RunError."""
+def _fill(unpacked: Opened) -> None:
+    """Copy what runs: without the results, and beside the installed code only files that are read, not executed."""
+    for name in unpacked.listed:
+        is_read = name.endswith(_READ) and not name.startswith(".")
+        if name.startswith(f"results/{unpacked.study}/"):
+            continue
+        if not unpacked.code.is_installed or installed.is_code(name) or is_read:
+            target = unpacked.folder / REBUILT / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(unpacked.folder / ARCHIVED / name, target)
+
+
+def _run(unpacked: Opened, way: Way, cores: int, expected: list[str], tell: Tell) -> list[str]:
+    """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
-    command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={rebuilt.study}"]
-    away = _without_network()
-    if not away:
-        rebuilt.notes.append("the network could not be taken away from the run; it was given a proxy that is not there")
-    log = place / "rebuild.log"
+    command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
+    folder, log = unpacked.folder / REBUILT, unpacked.folder / LOG
     with log.open("wb") as out:
-        running = subprocess.Popen(
-            [*away, *command],
-            cwd=place,
-            env=environment(place),
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+        running = sandbox.start(way, command, folder, out)
         try:
             told = -1
             while running.poll() is None:
-                there = sum((place / name).exists() for name in expected)
+                there = sum((folder / name).exists() for name in expected)
                 if there * 10 // len(expected) > told:
                     told = there * 10 // len(expected)
                     tell(f"running: {there} of {len(expected)} files are there")
                 time.sleep(0.2)
         finally:
-            if running.poll() is None:
-                os.killpg(running.pid, signal.SIGTERM)
-                running.wait()
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+            sandbox.end(running)
+    lines = _last_of(log).splitlines()
     if running.returncode != 0:
-        where = f", in {rebuilt.folder}" if rebuilt.folder else ""
+        where = f", in {unpacked.folder}" if unpacked.kept else ""
         raise RunError(
-            f"{rebuilt.archive}: its run failed{where}, exit status {running.returncode}:", lines[-LAST_LINES:]
+            f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:", lines[-LAST_LINES:]
         )
     return lines
 
 
-def environment(place: Path) -> dict[str, str]:
-    """Return the environment variables of a run in a folder: nothing of who runs it, and no way to a network."""
-    home = place / ".home"
-    (home / "tmp").mkdir(parents=True, exist_ok=True)
-    kept = {name: os.environ[name] for name in ("LD_LIBRARY_PATH",) if name in os.environ}
-    proxies = ("http_proxy", "https_proxy", "ftp_proxy", "all_proxy")
-    return kept | {
-        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.defpath]),
-        "HOME": str(home),
-        "TMPDIR": str(home / "tmp"),
-        "XDG_CACHE_HOME": str(home / "cache"),
-        "XDG_CONFIG_HOME": str(home / "config"),
-        "LANG": "C.UTF-8",
-        "PYTHONPATH": str((place / "src").resolve()),
-        "PYTHONNOUSERSITE": "1",
-        **dict.fromkeys([*proxies, *map(str.upper, proxies)], _NOWHERE),
-    }
+def _last_of(log: Path) -> str:
+    with log.open("rb") as file:
+        file.seek(max(0, log.stat().st_size - _LOG_READ))
+        return file.read().decode("utf-8", "replace")
 
 
-def _without_network() -> list[str]:
-    """Return what to put before a command so that it has no network; nothing where that is not allowed."""
-    for way in (
-        ["unshare", "--net"],
-        ["unshare", "--map-current-user", "--net"],
-        ["unshare", "--map-root-user", "--net"],
-    ):
-        try:
-            if subprocess.run([*way, "true"], capture_output=True, check=False).returncode == 0:
-                return way
-        except OSError:
-            break
-    return []
-
-
-def _compare(rebuilt: Rebuilt, place: Path, results: Mapping[str, str]) -> None:
+def _compare(rebuilt: Rebuilt, folder: Path, results: Mapping[str, str]) -> None:
     """Compare what was made with what was archived, file by file."""
-    top = f"results/{rebuilt.study}/"
-    timed = catalogue.showing_times(yaml_file.load(place / "config" / f"{rebuilt.study}.yaml"))
+    top, made = f"results/{rebuilt.study}/", (folder / REBUILT).resolve()
+    timed = catalogue.showing_times(yaml_loader.load(folder / ARCHIVED / "config" / f"{rebuilt.study}.yaml"))
     times = tuple(top + name for name in (*_SIDE, *(f"{name}." for name in timed)))
     for name, digest in results.items():
-        new = place / name
+        new = made / name
         if name.startswith(times):
             rebuilt.left_out.append(name)
         elif not new.is_file():
             rebuilt.different[name] = ["was not made"]
+        elif new.resolve() != new:  # to the archive's own, perhaps
+            rebuilt.different[name] = ["was not made: there is a link"]
         elif manifest.digest_of(new) == digest:
             rebuilt.same.append(name)
         else:
-            lines = _told_apart(place / ARCHIVED / name.removeprefix("results/"), new)
+            lines = _told_apart(folder / ARCHIVED / name, new)
             if lines:
                 rebuilt.different[name] = lines
             else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import re
@@ -15,23 +14,28 @@ from urllib.parse import unquote
 
 import xarray as xr
 
-from stiffdice import asked, sanity, sweep
-from stiffdice import study as studies
 from stiffdice.archive import manifest
-from stiffdice.archive.report import Report
-from stiffdice.archive.unzip import unzip
+from stiffdice.archive.consistency import check as sanity
+from stiffdice.archive.consistency import sweeps, words
+from stiffdice.archive.extract import unzip
+from stiffdice.archive.verify_report import Report
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io import quarantine, schema
-from stiffdice.io.enums import meanings_of
-from stiffdice.io.read import open_file, parts
-from stiffdice.sanity import sweeps, words
+from stiffdice.io import isolation, schema
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.io.reader import open_file, parts
+from stiffdice.io.text_file import rows_of, text_of
+from stiffdice.study import config as studies
+from stiffdice.study import job_log, output_digest, provenance
+from stiffdice.sweep import sweep
 
 CRATE = "ro-crate-metadata.json"
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_LARGEST_TEXT = 200_000_000  # bytes of a manifest or a crate's description
+_LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
 _SCHEMA = Path("workflow/schemas/study.schema.yaml")
 _SHARD = re.compile("[0-9a-f]{12}")
+# Of a job, under the folder of its study's results.
+_LOG = re.compile("((?:.*/)?)logs/.+[.]log")
 
 Tell = Callable[[float], None]
 
@@ -102,6 +106,7 @@ class _Folder:
                 tell(name)
             self._check_manifest(digests)
             self._check_crate(digests)
+            self._check_made()
         else:
             report.note(f"digests (there is no {manifest.NAME})")
             self._check_asked()
@@ -145,27 +150,41 @@ class _Folder:
         return found
 
     def _text(self, name: str) -> str:
+        """Return the text of a file; raises RefusedError, not naming it."""
         path = self._files[name]
-        if path.stat().st_size > _LARGEST_TEXT:
-            raise RefusedError(f"larger than {_LARGEST_TEXT} bytes")
         try:
-            return path.read_text(encoding="utf-8")
-        except UnicodeDecodeError:
-            raise RefusedError("not a text file (UTF-8)") from None
+            return text_of(path, _LARGEST_TEXT)
+        except InputError as error:
+            raise RefusedError(str(error).removeprefix(f"{path}: ")) from None
 
     def _check_asked(self) -> None:
         """Check a study's results against what it asks now, in the project's folder."""
         name = self._folder.resolve().name
         if not _SCHEMA.is_file() or self._folder.resolve() != Path("results", name).resolve():
             self.report.note("whether a study asks for these results, as this is not its project's folder")
+            self._check_made()
             return
         try:
-            stale = asked.stale(asked.of(studies.load(f"config/{name}.yaml", _SCHEMA)), self._folder)
+            stale = provenance.stale(provenance.of(studies.load(f"config/{name}.yaml", _SCHEMA)), self._folder)
         except InputError as error:
             self.report.note(f"whether a study asks for these results ({error})")
+            self._check_made()
             return
         for result, reason in stale.items():
             self.report.fail(result.files[0], f"stale: {reason}")
+
+    def _check_made(self) -> None:
+        """Check results against the digests that their jobs' logs say."""
+        untold = {name for name in self._files if name.endswith(".h5")}
+        for name, path in self._files.items():
+            if not (log := _LOG.fullmatch(name)) or (told := job_log.read(path)) is None:
+                continue
+            there = [file for file in told.made if log[1] + file in self._files]
+            untold.difference_update(log[1] + file for file in there)
+            for file in output_digest.changed(told, self._folder / log[1], *there):
+                self.report.fail(log[1] + file, output_digest.reason(told, [file]))
+        if untold:
+            self.report.note(f"whether {len(untold)} .h5 files are what their jobs made (no log says it)")
 
     def _check_manifest(self, digests: Mapping[str, str]) -> None:
         report = self.report
@@ -240,7 +259,7 @@ class _Files:
 
     def try_apart(self, files: Mapping[str, Path]) -> None:
         """Let another process read the files first: one that crashes it, or takes it too long, is not opened here."""
-        self._refused = quarantine.refused(files.values())
+        self._refused = isolation.refused(files.values())
 
     def check(self, name: str, path: Path) -> None:
         """Check one file by itself."""
@@ -273,9 +292,8 @@ class _Files:
     def _listed(self, table: str, folder: str, files: Mapping[str, Path]) -> list[str]:
         """Return the shards that a sweep was collected from; those that are not there fail."""
         try:
-            with files[table].open(encoding="utf-8", newline="") as file:
-                shards = [row["shard"] for row in csv.DictReader(file)]
-        except (OSError, KeyError, ValueError, csv.Error) as error:
+            shards = [row["shard"] for row in rows_of(files[table])]
+        except (InputError, KeyError) as error:
             self._report.fail(table, f"not a table of shards ({type(error).__name__})")
             return []
         names = [
@@ -367,11 +385,12 @@ class _Files:
         self._report.fail(name, *(where + problem for problem in problems))
 
 
-# What of a file the checks of one file cannot see, by its kind.
+# What of a file the checks of it alone cannot see, by its kind.
 _ALONE = {
-    "shard": "measures and contact laws of shards apart from their sweep",
-    "sweep": "counts of sweeps and surveys apart from their shards",
-    "frontier": "edges and power laws of frontiers apart from their sweep",
+    "run": "motion of runs from state to state, touch-down phases and measures (a rebuild computes them again)",
+    "shard": "numbers of shards apart from their sweep",
+    "sweep": "numbers of sweeps and surveys apart from their shards",
+    "frontier": "numbers of frontiers apart from their sweep",
     "experiment": "numbers of experiments and timings (no other file has them)",
 }
 

@@ -1,1 +1,1 @@
-"""Questions asked of the simulator itself, each of one kind of motion made for it."""
+"""Questions that single runs answer, each with a motion made for it."""

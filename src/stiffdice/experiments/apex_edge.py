@@ -2,9 +2,10 @@
 
 Under the `ungated` law a falling cube is braked in the air. A rebound from a height H returns, solved exactly, to
 R(H) H: the lower H is, the shorter is the fall and the less it costs. Symplectic Euler multiplies the energy of a
-bounce by up to `theory.largest_gain`, so that a rebound goes higher than the one before as soon as R(H) · gain exceeds
-1 + tolerance. So the lowest rebounds that count decide; and where nothing says which count, the duration decides, as it
-sets how low they become before the end. Under the `gated` law R hardly depends on H: height and duration do not matter.
+bounce by up to `linear_theory.largest_gain`, so that a rebound goes higher than the one before as soon as R(H) · gain
+exceeds 1 + tolerance. So the lowest rebounds that count decide; and where nothing says which count, the duration
+decides, as it sets how low they become before the end. Under the `gated` law R hardly depends on H: height and duration
+do not matter.
 """
 
 from __future__ import annotations
@@ -17,15 +18,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks, exact, theory
-from stiffdice.contact import LAWS
-from stiffdice.criteria import apex
-from stiffdice.ensemble import phased, turned
+from stiffdice.dynamics import flat_bounce, linear_theory
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
-from stiffdice.io import layout
-from stiffdice.scene import Scene
-from stiffdice.simulate import simulate
-from stiffdice.state import Array
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.criteria import apex
+from stiffdice.simulation.initial_conditions import phased, turned
+from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -50,13 +52,15 @@ def measure(
 
     Raises InputError for a number out of range.
     """
-    heights = [checks.number("hop_height", value, "m", at_least=0) for value in hop_height]
-    durations = [checks.number("duration", value, "s", above=0) for value in duration]
-    ends = [checks.number("omega_h", value, "1", above=0) for value in omega_h]
-    if len(ends) != 2 or not ends[0] < ends[1] < theory.STABILITY_LIMIT:
-        raise InputError(f"omega_h = {checks.shown(list(omega_h))}: allowed are two numbers, 0 < low < high < 2 [1]")
-    scan = np.geomspace(ends[0], ends[1], checks.count("count", count, at_least=2))
-    members = checks.count("members", members)
+    heights = [validation.number("hop_height", value, "m", at_least=0) for value in hop_height]
+    durations = [validation.number("duration", value, "s", above=0) for value in duration]
+    ends = [validation.number("omega_h", value, "1", above=0) for value in omega_h]
+    if len(ends) != 2 or not ends[0] < ends[1] < linear_theory.STABILITY_LIMIT:
+        raise InputError(
+            f"omega_h = {validation.shown(list(omega_h))}: allowed are two numbers, 0 < low < high < 2 [1]"
+        )
+    scan = np.geomspace(ends[0], ends[1], validation.count("count", count, at_least=2))
+    members = validation.count("members", members)
     edges = np.full((len(LAWS), len(durations), len(heights)), np.nan)
     predicted = np.full((len(LAWS), len(heights)), np.nan)
     for k, law in enumerate(LAWS):
@@ -73,7 +77,7 @@ def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
     asked = {"apex": apex.TOLERANCE}
     launches = turned(scene, MODEL, members)
     for omega_h in scan:
-        steps = round(theory.steps_for(scene, float(omega_h)))
+        steps = round(linear_theory.steps_for(scene, float(omega_h)))
         spread = phased(scene, MODEL, steps, members, launches, slice(0, members))
         run = simulate(
             scene,
@@ -86,15 +90,15 @@ def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
             hop_height=height,
         )
         if (run.measures[apex.MEASURE] > apex.BASE + apex.TOLERANCE).any():
-            return float(theory.omega_h(scene, steps))
+            return float(linear_theory.omega_h(scene, steps))
     return math.nan
 
 
 def prediction(scene: Scene, height: float) -> float:
     """Return the smallest ωh [1] at which a rebound from a height [m] may go higher by more than `apex` tolerates."""
     kept = returned(scene, height)
-    for omega_h in np.geomspace(0.01, theory.STABILITY_LIMIT * (1 - 1e-9), _FINE):
-        if kept * theory.largest_gain(float(omega_h)) > apex.BASE + apex.TOLERANCE:
+    for omega_h in np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE):
+        if kept * linear_theory.largest_gain(float(omega_h)) > apex.BASE + apex.TOLERANCE:
             return float(omega_h)
     return math.nan
 
@@ -108,7 +112,7 @@ def returned(scene: Scene, height: float) -> float:
         return 1.0
     drag = 8 * scene.ground.damping / scene.cube.mass if scene.ground.contact == "ungated" else 0.0
     speed = _landing_speed(scene.gravity, drag, height)
-    return (exact.restitution(scene, speed) * speed) ** 2 / (2 * scene.gravity * height)
+    return (flat_bounce.restitution(scene, speed) * speed) ** 2 / (2 * scene.gravity * height)
 
 
 def _landing_speed(gravity: float, drag: float, height: float) -> float:
@@ -146,16 +150,16 @@ def _dataset(
         ),
     }
     coordinates: dict[str, Any] = {
-        "contact": ("contact", np.arange(len(LAWS), dtype=np.int8), layout.CONTACT_ATTRIBUTES),
+        "contact": ("contact", np.arange(len(LAWS), dtype=np.int8), dataset.CONTACT_ATTRIBUTES),
         "duration": ("duration", durations, {"long_name": "duration of the runs", "units": "s"}),
         "hop_height": ("hop_height", heights, {"long_name": "height from which rebounds count", "units": "m"}),
     }
-    attributes = layout.provenance_attributes(
+    attributes = dataset.provenance_attributes(
         "Edge of apex by hop height and duration", scene, MODEL, SCHEME, "stiffdice.experiments.apex_edge"
     )
     attributes |= {
         "members": members,
-        "criteria": layout.criteria_text({"apex": apex.TOLERANCE}),
+        "criteria": dataset.criteria_text({"apex": apex.TOLERANCE}),
         "scene_note": "contact law and duration are the table's, not the scene's",
     }
     return xr.Dataset(variables, coordinates, attributes)

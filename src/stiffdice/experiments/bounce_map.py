@@ -7,9 +7,9 @@ law gives back what it took, e² = 1, and all that differs is the time step's. W
   ¼(ωh)² where ωh is small.
 - Both bounds are attained, and only half way between two magic steps, ωh = 2 sin(π/(2k + 1)) = √3, 1.176, 0.868, ...:
   the gain by a node that touches the ground at a step (phase 0), the loss half a step later. Between these steps the
-  largest gain is `theory.largest_gain`, always at phase 0, and the largest loss takes e² to its inverse. For small ωh
-  that is |e²−1| = (ωh)² f(1 − f), f being the fraction that half a period has beyond whole steps. Above √3 the bound is
-  out of reach: it grows without end towards ωh = 2, the largest e² to 9.
+  largest gain is `linear_theory.largest_gain`, always at phase 0, and the largest loss takes e² to its inverse. For
+  small ωh that is |e²−1| = (ωh)² f(1 − f), f being the fraction that half a period has beyond whole steps. Above √3 the
+  bound is out of reach: it grows without end towards ωh = 2, the largest e² to 9.
 - At the magic steps ωh = 2 sin(π/2n) every phase conserves energy to round-off.
 - The mean of 1/e² over the phases is 1, because a step conserves areas of place and velocity; so the mean of e² is not
   below 1. Off the magic steps bounces of random phase heat a cube on average, though only by O((ωh)⁴).
@@ -28,12 +28,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks, schemes, theory
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.state import Array, Ensemble, start_of
 from stiffdice.errors import InputError
-from stiffdice.io import layout
-from stiffdice.scene import Launch, Scene
-from stiffdice.simulate import simulate
-from stiffdice.state import Array, Ensemble, start_of
+from stiffdice.integrators import registry as schemes
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Launch, Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -59,9 +61,9 @@ def measure(
 
     Raises InputError for a number out of range, and for a scene whose cube would not bounce flat and short.
     """
-    scan = _scan(omega_h, checks.count("count", count, at_least=2))
-    phase = np.arange(checks.count("phases", phases)) / phases
-    omega = theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    scan = _scan(omega_h, validation.count("count", count, at_least=2))
+    phase = np.arange(validation.count("phases", phases)) / phases
+    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
     speed = _speed(scene, omega)
     weightless = dataclasses.replace(_on_level_ground(scene), gravity=0.0)
     gain = np.array([_gain(weightless, speed, value / omega, phase) for value in scan])
@@ -71,14 +73,14 @@ def measure(
 
 def _scan(span: Sequence[float], count: int) -> Array:
     """Return the values of ωh, ascending."""
-    ends = [checks.number("omega_h", value, "1") for value in span]
-    if len(ends) != 2 or not _LOWEST <= ends[0] < ends[1] < theory.STABILITY_LIMIT:
+    ends = [validation.number("omega_h", value, "1") for value in span]
+    if len(ends) != 2 or not _LOWEST <= ends[0] < ends[1] < linear_theory.STABILITY_LIMIT:
         raise InputError(
-            f"omega_h = {checks.shown(list(span))}: allowed are two numbers, {_LOWEST:g} <= low < high < 2 [1]"
+            f"omega_h = {validation.shown(list(span))}: allowed are two numbers, {_LOWEST:g} <= low < high < 2 [1]"
         )
     low, high = ends
-    magic = theory.magic_steps(low, high)
-    between = [theory.magic_step(n - 0.5) for n in (*magic, max(magic, default=1) + 1)]
+    magic = linear_theory.magic_steps(low, high)
+    between = [linear_theory.magic_step(n - 0.5) for n in (*magic, max(magic, default=1) + 1)]
     inside = [value for value in between if low <= value <= high]
     # The exact ends: geomspace's may differ in the last digit.
     return np.unique([low, *np.geomspace(low, high, count)[1:-1], high, *magic.values(), *inside])
@@ -106,7 +108,7 @@ def _speed(scene: Scene, omega: float) -> float:
 
 def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
     """Return e²−1 of one bounce at each phase, from the kinetic energy at zero height, before and after."""
-    omega = theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
     # Weight lengthens the contact from half a period by twice the angle it takes up to the sag.
     contact = (math.pi + 2 * math.atan(scene.gravity / (omega * speed))) / (2 * math.asin(omega * h / 2))
     steps = 4 + math.ceil(contact)
@@ -127,17 +129,17 @@ def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
 
 
 def _dataset(scene: Scene, speed: float, scan: Array, phase: Array, gain: Array, weighed: Array) -> xr.Dataset:
-    step = scan / theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    step = scan / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
     described: tuple[tuple[str, Array, str], ...] = (
         ("largest_gain", gain.max(axis=1), "largest energy gain over the phases"),
         ("smallest_gain", gain.min(axis=1), "smallest energy gain over the phases"),
         ("mean_gain", gain.mean(axis=1), "mean energy gain over the phases"),
         (
             "largest_gain_theory",
-            np.array([theory.largest_gain(value) - 1 for value in scan]),
+            np.array([linear_theory.largest_gain(value) - 1 for value in scan]),
             "largest energy gain by theory",
         ),
-        ("gain_bound", np.array([theory.gain_bound(value) - 1 for value in scan]), "1/(1 - (omega h)^2/4) - 1"),
+        ("gain_bound", np.array([linear_theory.gain_bound(value) - 1 for value in scan]), "1/(1 - (omega h)^2/4) - 1"),
         ("loss_bound", scan**2 / 4, "(omega h)^2/4, the bound of a loss, and of a gain where omega h is small"),
         ("largest_with_gravity", weighed, "largest size of the energy gain over the phases, with the scene's gravity"),
         ("gravity_theory", 2 * scene.gravity * step / speed, "2 g h/v, the size that gravity gives it at a magic step"),
@@ -153,10 +155,10 @@ def _dataset(scene: Scene, speed: float, scan: Array, phase: Array, gain: Array,
         "speed": ((), speed, {"long_name": "speed at which the cube meets the ground", "units": "m s-1"}),
     }
     coordinates: dict[str, Any] = {
-        "omega_h": ("omega_h", scan, layout.CELL_ATTRIBUTES["omega_h"]),
+        "omega_h": ("omega_h", scan, dataset.CELL_ATTRIBUTES["omega_h"]),
         "phase": ("phase", phase, {"long_name": "fraction of the step before the node meets the ground", "units": "1"}),
     }
-    attributes = layout.provenance_attributes(
+    attributes = dataset.provenance_attributes(
         "Energy of single bounces", scene, MODEL, SCHEME, "stiffdice.experiments.bounce_map"
     )
     attributes["scene_note"] = (

@@ -17,17 +17,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice import checks, schemes, theory
-from stiffdice.compiled import njit
-from stiffdice.contact import LAWS
-from stiffdice.cube import INERTIAS
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.models.registry import MODELS
+from stiffdice.dynamics.rotation import rotated
+from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
 from stiffdice.errors import InputError
-from stiffdice.io import layout
-from stiffdice.io.enums import enum_attributes
-from stiffdice.models import MODELS
-from stiffdice.scene import Launch, Scene
-from stiffdice.simulate import simulate
-from stiffdice.state import STATE, Array, Physics, States, physics_of, rotated
+from stiffdice.integrators import registry as schemes
+from stiffdice.io.cf_enums import enum_attributes
+from stiffdice.scene import validation
+from stiffdice.scene.cube import INERTIAS
+from stiffdice.scene.scene import Launch, Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
 _TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
@@ -84,7 +87,7 @@ def measure(
     zeta = _numbers("zeta", zeta, 0.0, 1.0)
     nudge_zeta = _numbers("nudge_zeta", nudge_zeta, 0.0, 1.0)
     scan = _numbers("omega_h_relative", omega_h_relative, *_SCAN)
-    steps = checks.count("steps", steps, at_least=20)
+    steps = validation.count("steps", steps, at_least=20)
     scenes = [_on_level_ground(scene, inertia) for inertia in INERTIAS]
     modes = [{name: _mode(level, name) for name in _TILTS} for level in scenes]
     limits = np.array([[[_limit(mode, value) for value in zeta] for mode in row.values()] for row in modes])
@@ -101,9 +104,11 @@ def measure(
 
 
 def _numbers(key: str, values: Sequence[float], smallest: float, largest: float) -> list[float]:
-    numbers = [checks.number(key, value, "1") for value in values]
+    numbers = [validation.number(key, value, "1") for value in values]
     if not numbers or min(numbers) < smallest or max(numbers) > largest:
-        raise InputError(f"{key} = {checks.shown(values)}: allowed are numbers from {smallest:g} to {largest:g} [1]")
+        raise InputError(
+            f"{key} = {validation.shown(values)}: allowed are numbers from {smallest:g} to {largest:g} [1]"
+        )
     return numbers
 
 
@@ -112,7 +117,7 @@ def _on_level_ground(scene: Scene, inertia: str) -> Scene:
     level = scene.with_ground(normal=(0.0, 0.0, 1.0), friction=0.0, damping=0.0, contact="gated")
     stiffness = scene.ground.stiffness
     lowest, highest = (part * cube.side for part in _SAGS)
-    if not lowest <= theory.sag(scene) <= highest:
+    if not lowest <= linear_theory.sag(scene) <= highest:
         raise InputError(
             f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by m g/(4 S); "
             f"allowed is {lowest:.3g} to {highest:.3g} [m]"
@@ -212,7 +217,7 @@ def _mode(scene: Scene, name: str) -> _Mode:
     else:
         found = np.argmax(squares)
     touching = contact.offsets[:, 2] < contact.offsets[:, 2].min() + _PRELOAD * scene.cube.side
-    modes = theory.contact_modes(scene, scene.cube.node_offsets(), touching)
+    modes = linear_theory.contact_modes(scene, scene.cube.node_offsets(), touching)
     predicted = modes[np.argmin(np.abs(modes - squares[found]))]
     return _Mode(contact, shapes[:, found], float(squares[found]), float(predicted))
 
@@ -231,7 +236,7 @@ def _limit(mode: _Mode, zeta: float) -> float:
         step = inside.T @ _jacobian(mode.contact, damping, h) @ inside
         return bool(np.abs(np.linalg.eigvals(step)).max() <= 1 + _TINY)
 
-    low, high = 0.0, 2 * theory.STABILITY_LIMIT / omega
+    low, high = 0.0, 2 * linear_theory.STABILITY_LIMIT / omega
     while high - low > 1e-10 * high:
         middle = (low + high) / 2
         low, high = (middle, high) if stable(middle) else (low, middle)
@@ -244,11 +249,11 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     zeta, relative: damping ratio, and ωh in units of its limit, of the nudged motion. A cube that is tipped at rest is
     toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I.
     """
-    half, sag = scene.cube.side / 2, theory.sag(scene)
+    half, sag = scene.cube.side / 2, linear_theory.sag(scene)
     tips = abs(mode.shape[0]) < 0.5
     toppling = scene.cube.mass * scene.gravity * half / scene.cube.moment_of_inertia if tips else 0.0
     omega = np.sqrt(mode.predicted - toppling)
-    h = relative * theory.stability_limit(zeta) / omega
+    h = relative * linear_theory.stability_limit(zeta) / omega
     lift, tip = (0.0, _NUDGE * sag / half) if tips else (_NUDGE * sag, 0.0)
     launch = Launch(position=(0.0, 0.0, half - sag + lift), velocity=(0.0, 0.0, 0.0), orientation=(tip, 0.0, 0.0))
     damped = scene.with_ground(damping=2 * zeta * omega * scene.ground.stiffness / mode.predicted)
@@ -295,8 +300,11 @@ def _dataset(
         np.array([[getattr(mode, name) for mode in row.values()] for row in modes]) for name in ("square", "predicted")
     )
     limit = limits * np.sqrt(predicted)[:, :, None]
-    theoretical = np.array([theory.stability_limit(value) for value in zeta])
-    growths = [[theory.growth(part * theory.stability_limit(value), value) for part in scan] for value in nudge_zeta]
+    theoretical = np.array([linear_theory.stability_limit(value) for value in zeta])
+    growths = [
+        [linear_theory.growth(part * linear_theory.stability_limit(value), value) for part in scan]
+        for value in nudge_zeta
+    ]
     variables: dict[str, Any] = {
         name: (dims, values, {"long_name": meaning, "units": "1"})
         for name, dims, values, meaning in (
@@ -316,7 +324,7 @@ def _dataset(
             ),
         )
     }
-    attributes = layout.provenance_attributes(
+    attributes = dataset.provenance_attributes(
         "Limits of the contact modes", scene, MODEL, SCHEME, "stiffdice.experiments.rocking"
     )
     attributes["scene_note"] = (

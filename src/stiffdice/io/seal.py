@@ -35,11 +35,17 @@ def seal(path: Path) -> None:
         file.write(line)
 
 
-def is_sealed(path: Path) -> bool:
-    """Return whether a file ends with such a line; raises OSError if it cannot be read."""
+def digest_in(path: Path) -> str | None:
+    """Return the SHA-256 that the line at the end of a file says, None without one; raises OSError if unreadable."""
     with path.open("rb") as file:
         file.seek(max(os.fstat(file.fileno()).st_size - LENGTH, 0))
-        return _PATTERN.fullmatch(file.read(LENGTH)) is not None
+        told = _PATTERN.fullmatch(file.read(LENGTH))
+        return told[1].decode("ascii") if told else None
+
+
+def is_sealed(path: Path) -> bool:
+    """Return whether a file ends with such a line; raises OSError if it cannot be read."""
+    return digest_in(path) is not None
 
 
 def check(path: Path) -> None:

@@ -1,6 +1,0 @@
-"""`python -m stiffdice` is the command `stiffdice`."""
-
-from stiffdice.cli import main
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -1,0 +1,1 @@
+"""Which scheme and how many steps a scene needs for an error."""

@@ -1,0 +1,1 @@
+"""Whether the numbers in a result can be true."""

@@ -1,0 +1,209 @@
+"""A zip file from elsewhere, unpacked into a folder: all of it, only it, and nothing anywhere else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import struct
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZipFile, ZipInfo
+
+from stiffdice.errors import InputError, OutputError, RefusedError
+
+AT_ONCE = 1 << 20  # bytes unpacked at a time
+# What zipfile and zlib raise of a damaged file.
+_DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, RuntimeError, ValueError, OverflowError)
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_ENCRYPTED = 1 << 0  # of a member's flags
+_HEADER = 30  # bytes of a member before its name
+_SMALL = 1_000_000  # bytes that a member may come to, whatever its ratio
+
+
+class Limits(NamedTuple):
+    """What an archive may hold at most: bytes unpacked, members, and bytes unpacked for one packed.
+
+    ratio: of members above a megabyte. Deflate cannot do more than 1032; what we pack reaches 30. folders: in all, also
+    those that are only in names; ours have some dozens. depth: parts of a name; ours have up to 6.
+    """
+
+    size: int = 20_000_000_000
+    members: int = 1_000_000
+    ratio: int = 200
+    folders: int = 10_000
+    depth: int = 20
+
+
+LIMITS = Limits()
+
+
+def unzip(
+    path: str | Path,
+    folder: str | Path,
+    tell: Callable[[float], None] | None = None,
+    *,
+    damaged: dict[str, str] | None = None,
+    limits: Limits = LIMITS,
+) -> None:
+    """Unpack a zip file that nobody vouches for into a new or empty folder, all of it or nothing.
+
+    tell: called with the fraction done. damaged: members whose content is not what it was are left out and noted here,
+    with the reason; without it, the first of them ends it. Raises RefusedError naming the file, the member and what is
+    wrong with it, InputError if it cannot be read or the folder is not empty, OutputError if there is no room.
+    """
+    target = Path(folder)
+    try:
+        archive = ZipFile(path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from None
+    except _DAMAGED as error:
+        raise RefusedError(f"{path}: not a zip file, or a damaged one ({error})") from None
+    with archive:
+        try:
+            check(archive.infolist(), limits)
+        except RefusedError as error:
+            raise error.within(str(path)) from None
+        _check_target(target, sum(member.file_size for member in archive.infolist()))
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            temporary.mkdir()
+            _unpack_all(archive, temporary, tell or (lambda done: None), damaged)
+            temporary.replace(target)
+        except OSError as error:
+            raise OutputError(f"{target}: {error.strerror}; nothing was unpacked") from None
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check(members: Sequence[ZipInfo], limits: Limits = LIMITS) -> None:
+    """Raise RefusedError naming the first member that must not be unpacked, and why."""
+    if len(members) > limits.members:
+        raise RefusedError(f"{len(members)} members; allowed are {limits.members}")
+    for member in members:
+        reason = _wrong(member, limits)
+        if reason:
+            raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
+    if sum(member.file_size for member in members) > limits.size:
+        raise RefusedError(f"more than {limits.size} bytes unpacked; this is no archive of a study")
+    _check_doubles(members, limits)
+    _check_overlaps(members)
+
+
+def _is_folder(member: ZipInfo) -> bool:
+    return member.filename.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
+
+
+def _wrong(member: ZipInfo, limits: Limits) -> str | None:
+    """Return why a member must not be unpacked: its name leads elsewhere, here or on another system, or what it is."""
+    name, method, size, packed = member.orig_filename, member.compress_type, member.file_size, member.compress_size
+    parts = name.removesuffix("/").split("/")
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    reasons = {
+        "a name with a character that is not printed": not name.isprintable(),  # also NUL, and what turns text around
+        "an absolute path": name.startswith("/"),
+        "a name with a backslash or a colon, which some systems take for a path": "\\" in name or ":" in name,
+        "a path that climbs out": ".." in parts,
+        "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
+        "a path with an empty part": "" in parts,
+        "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
+        f"{len(parts)} parts in a name; allowed are {limits.depth}": len(parts) > limits.depth,
+        "has a second name": member.filename != name,  # some versions of zipfile take it instead
+        "is a link or a special file; allowed are files and folders": kind
+        not in {0, stat.S_IFDIR if _is_folder(member) else stat.S_IFREG},
+        "is encrypted": member.flag_bits & _ENCRYPTED,
+        f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
+        f"{size} bytes out of {packed}; allowed are {limits.ratio} for one": size > max(_SMALL, limits.ratio * packed),
+    }
+    return next((reason for reason, holds in reasons.items() if holds), None)
+
+
+def _check_doubles(members: Sequence[ZipInfo], limits: Limits) -> None:
+    """Raise RefusedError if two names are one file somewhere: in any case, in any form of Unicode, or as a folder."""
+    folders: set[str] = set()
+    files: set[str] = set()
+    spelt: dict[str, str] = {}  # each path of a file or folder, as a file system may know it and as it is said
+    for member in members:
+        *above, last = member.filename.removesuffix("/").split("/")
+        path = ""
+        for part in [*above, last] if _is_folder(member) else above:
+            path += f"{part}/"
+            if path not in folders:
+                folders.add(path)
+                _take(path, spelt)
+        if len(folders) > limits.folders:
+            raise RefusedError(f"more than {limits.folders} folders; this is no archive of a study")
+        if not _is_folder(member):
+            if member.filename in files:
+                raise RefusedError(f"{member.filename}: is there twice")
+            files.add(member.filename)
+            _take(member.filename, spelt)
+
+
+def _take(path: str, spelt: dict[str, str]) -> None:
+    folded = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", path.removesuffix("/")).casefold())
+    other = spelt.setdefault(folded, path)
+    if other != path:
+        raise RefusedError(f"{path}: a name that some systems take for {other}")
+
+
+def _check_overlaps(members: Sequence[ZipInfo]) -> None:
+    """Raise RefusedError if two members share bytes (Fifield 2019, "A better zip bomb", USENIX WOOT).
+
+    zipfile itself does so from Python 3.11.8, 3.12.2 and 3.13 on, when the member is read.
+    """
+    end = 0
+    for member in sorted(members, key=lambda member: member.header_offset):
+        if member.header_offset < end:
+            raise RefusedError(f"{member.filename}: overlaps another member")
+        end = member.header_offset + _HEADER + member.compress_size
+
+
+def _check_target(target: Path, size: int) -> None:
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: the folder {target.parent} does not exist")
+    if target.is_symlink() or (target.exists() and not target.is_dir()):
+        raise OutputError(f"{target}: is there and not a folder")
+    if target.is_dir() and any(target.iterdir()):
+        raise OutputError(f"{target}: is not empty; name a new folder")
+    free = shutil.disk_usage(target.parent).free
+    if size > free:
+        raise OutputError(f"{target}: needs {size} bytes of disk, {free} are free; nothing was unpacked")
+
+
+def _unpack_all(archive: ZipFile, folder: Path, tell: Callable[[float], None], damaged: dict[str, str] | None) -> None:
+    members = archive.infolist()
+    done, total = 0, 1 + sum(member.compress_size for member in members)
+    for member in members:
+        try:
+            _unpack(archive, member, folder / member.filename)
+        except _DAMAGED as error:
+            reason = f"damaged: {error or 'cut short'}"
+            if damaged is None:
+                raise RefusedError(f"{archive.filename}: {member.filename}: {reason}") from None
+            damaged[member.filename] = reason
+        done += member.compress_size
+        tell(done / total)
+
+
+def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
+    """Unpack one member; raises one of _DAMAGED, and leaves no file, if its content is damaged."""
+    if _is_folder(member):
+        path.mkdir(parents=True, exist_ok=True)
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        # Not through anything that is there; every folder above is one that we made.
+        with archive.open(member) as file, path.open("xb") as out:
+            shutil.copyfileobj(file, out, AT_ONCE)
+            if out.tell() != member.file_size:
+                raise zipfile.BadZipFile(f"{out.tell()} bytes instead of {member.file_size}")
+    except _DAMAGED:
+        path.unlink(missing_ok=True)
+        raise
+    if member.external_attr >> 16 & stat.S_IXUSR:
+        path.chmod(path.stat().st_mode | ((path.stat().st_mode & 0o444) >> 2))

@@ -1,0 +1,1 @@
+"""The command `stiffdice`, one module per subcommand."""

@@ -1,0 +1,162 @@
+"""`stiffdice advise`: how to run a scene to an error."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from stiffdice.cli import output
+from stiffdice.cli.options import add_changes, number
+from stiffdice.errors import InputError, printable
+
+if TYPE_CHECKING:
+    from stiffdice.scene.scene import Scene
+
+EXAMPLES = """\
+examples:
+  stiffdice advise config/scenes/figure-04.yaml --error 1%
+  stiffdice advise --stiffness 1e6 --mass '20 g' --contact gated --error 1e-6
+  stiffdice advise --side '16 mm' --mass '5 g' --restitution 0.5 --position '0,0,30 cm' --velocity 1,0,0 --error 0.1%
+  stiffdice advise config/scenes/figure-09.yaml --error 1% --horizon 2 --run -o advised.h5
+  stiffdice advise config/scenes/figure-09.yaml --scheme symplectic_euler --json
+
+The error is the root mean square distance of the cube's centre from the exact path, over evenly spread times from the
+launch to the end (or the horizon), in radii of the cube: 1% of a 1 m cube is 1 cm. A tumbling cube is chaotic, and a
+path may be known for a part of the duration only; the advice is then for that part, and says so. A pilot run ends after
+3,000,000 force evaluations: all of it takes about ten seconds, and more where something has to be compiled.
+Where there is no SCENE.yaml, keys not given have the paper's values. The first advice on a machine compiles, which may
+take a minute. Exit status: 0 for an advice, with --run for a promise kept; 1 if nothing keeps the error, with --run if
+the promise is found broken; 2 for bad input.
+"""
+
+# Keys of the scene that `advise` has an option for, and what they are.
+_KEYS = {
+    "stiffness": ("ground.stiffness", "of the ground, per node [kg/s²]"),
+    "contact_time": ("ground.contact_time", "with --restitution, in place of a stiffness: of a flat landing [s]"),
+    "damping": ("ground.damping", "of the ground, per node [kg/s]"),
+    "restitution": ("ground.restitution", "in place of a damping: speed up over speed down of a flat landing"),
+    "friction": ("ground.friction", "coefficient of friction"),
+    "contact": ("ground.contact", "ungated or gated"),
+    "mass": ("cube.mass", "of the cube [kg]"),
+    "radius": ("cube.radius", "of the cube, centre to corner [m]"),
+    "side": ("cube.side", "of the cube, in place of its radius [m]"),
+    "position": ("launch.position", "where the centre starts, as 0,0,3 [m]"),
+    "velocity": ("launch.velocity", "of the launch, as 5,0,5 [m/s]"),
+    "spin": ("launch.angular_momentum", "angular momentum of the launch, as 0.1,0,0 [kg m²/s]"),
+    "duration": ("duration", "of the run [s]"),
+}
+_VECTORS = ("position", "velocity", "spin")
+_EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    advise = commands.add_parser(
+        "advise",
+        help="say how to run a scene to an error you choose: model, scheme, steps, time",
+        description="Say how to run a scene to an error: model, scheme, steps or tolerance, what they cost, and why.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    advise.add_argument(
+        "scene", metavar="SCENE.yaml", nargs="?", help="the physical problem; without it, the options below"
+    )
+    advise.add_argument(
+        "--error", default="1%", metavar="X", help="as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
+    )
+    advise.add_argument("--horizon", metavar="T", help="until when to keep it [s] (default: the duration)")
+    advise.add_argument("--scheme", metavar="NAME", help="advice for this scheme alone (default: all are compared)")
+    advise.add_argument(
+        "--run",
+        action="store_true",
+        help="do it, and check the promise against a run of twice the cost and another method",
+    )
+    advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
+    advise.add_argument("--json", action="store_true", help="the same for programs")
+    output.add_force(advise)
+    add_changes(advise)
+    scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
+    either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
+    for name, (_, text) in _KEYS.items():
+        metavar = "X,Y,Z" if name in _VECTORS else "LAW" if name == "contact" else "X"
+        either.get(name, scene).add_argument(f"--{name.replace('_', '-')}", metavar=metavar, help=text)
+    advise.set_defaults(call=_advise)
+
+
+def _given(options: argparse.Namespace) -> list[str]:
+    """Return the changes to a scene that the options of `advise` ask for, as `key.path=value`."""
+    given = []
+    for name, (key, _) in _KEYS.items():
+        text = getattr(options, name)
+        if text is not None:
+            given.append(f"{key}=[{text}]" if name in _VECTORS else f"{key}={text}")
+    return given + options.overrides
+
+
+def _named(options: argparse.Namespace, changes: Sequence[str]) -> list[str]:
+    """Return the arguments of `run` that name the scene of `advise`; none without a file, which `run` needs."""
+    if options.scene is None:
+        return []
+    preset = [] if options.preset is None else ["--preset", options.preset]
+    return [options.scene, *preset, *(word for change in changes for word in ("--set", change))]
+
+
+def _in_radii(text: str, scene: Scene) -> str:
+    """Return an error as a part of the radius if it is given as a length, any other as it is."""
+    from stiffdice.scene import units
+
+    if units.has_unit(text, "m"):
+        return repr(units.in_si(text, "m") / scene.cube.radius)
+    if comma := units.decimal_comma(text):
+        raise InputError(f"--error = {text}: {comma}")
+    return text
+
+
+def _advise(options: argparse.Namespace) -> int:
+    from stiffdice.io import seal
+    from stiffdice.scene import scene as scenes
+
+    changes = _given(options)
+    if options.scene is None:
+        scene = scenes.changed({}, changes, options.preset)
+    else:
+        scene = scenes.load(options.scene, changes, options.preset)
+    horizon = None if options.horizon is None else number("--horizon", options.horizon, "s")
+    if options.output is not None and not options.run:
+        raise InputError("-o: a file is written with --run only")
+    target = None
+    if options.output is not None:
+        target = output.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
+
+    # These take about a second to import; bad input is told before.
+    from stiffdice.advice import recommend
+    from stiffdice.advice import report as advice_text
+    from stiffdice.cli.progress import Notes, Progress
+    from stiffdice.simulation.outcome import Verdict
+
+    error = recommend.parsed_error(_in_radii(options.error, scene))
+    with Notes("advise: trying") as notes:
+        given = recommend.advise(scene, error, horizon=horizon, scheme=options.scheme, tell=notes.show)
+    check = None
+    if options.run and given.best is not None:
+        with Progress() as progress:
+            run = recommend.run_advised(given, given.best, progress.show)
+        with Progress() as progress:
+            check = recommend.check(given, run, progress.show)
+        if target is not None:
+            from stiffdice.io.writer import write_dataset
+            from stiffdice.simulation.dataset import run_dataset
+
+            write_dataset(run_dataset(run), target)
+    if options.json:
+        print(advice_text.as_json(given, check))
+    else:
+        for line in scene.derived:
+            print(line)
+        print(advice_text.as_text(given, _named(options, changes)))
+        if check is not None:
+            print("\n" + advice_text.check_as_text(check))
+            if target is not None:
+                print(printable(f"{target}: {Verdict(run.verdict[0]).sentence}"))
+    return 0 if given.best is not None and (check is None or check.kept) else 1

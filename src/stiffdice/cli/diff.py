@@ -1,0 +1,45 @@
+"""`stiffdice diff`: whether two results differ, where, and by how much."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-09.yaml -o listed.h5
+  stiffdice run config/scenes/figure-09.yaml --preset as_written -o written.h5
+  stiffdice diff listed.h5 written.h5
+  make study STUDY=quick
+  cp -r results/quick before
+  stiffdice diff before results/quick --json
+
+The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. A unit in the last place
+(ulp) is the step from one double to the next. The shards of a sweep are compared cell by cell, however the cells are
+dealt to them. Logs, times, reports, and figures and tables that show times differ from one rebuild to the next; they
+are left out, unless --all is given.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    diff = commands.add_parser(
+        "diff",
+        help="say whether two results differ, where, and by how much",
+        description="Say whether two files, folders of results or archives differ, where, and by how much.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
+    diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
+    diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")
+    diff.add_argument("--json", action="store_true", help="the same for programs, and all of it")
+    diff.set_defaults(call=_diff)
+
+
+def _diff(options: argparse.Namespace) -> int:
+    from stiffdice.archive.compare.compare import compare
+
+    found = compare(options.a, options.b, all_files=options.all)
+    print(found.as_json() if options.json else "\n".join(found.lines()))
+    return 0 if found.same else 1

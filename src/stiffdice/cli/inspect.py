@@ -1,0 +1,38 @@
+"""`stiffdice inspect`: what a file holds."""
+
+from __future__ import annotations
+
+import argparse
+
+EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-04.yaml -o throw.h5
+  stiffdice inspect throw.h5
+  stiffdice inspect throw.h5 --json
+  make study STUDY=quick
+  stiffdice inspect results/quick/sweeps/steps-needed/sweep.h5
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    inspect = commands.add_parser(
+        "inspect",
+        help="say what a file holds: its verdict, its scene, its variables",
+        description="Say what a file of stiffdice holds: its verdict, its scene, its variables.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    inspect.add_argument("file", metavar="FILE.h5")
+    inspect.add_argument("--json", action="store_true", help="the same for programs")
+    inspect.set_defaults(call=_inspect)
+
+
+def _inspect(options: argparse.Namespace) -> None:
+    from stiffdice.io import isolation
+    from stiffdice.io.reader import open_file
+    from stiffdice.report import file_page
+
+    isolation.admit(options.file)
+    dataset = open_file(options.file)
+    print(file_page.as_json(dataset) if options.json else file_page.as_text(dataset, options.file))

@@ -1,0 +1,105 @@
+"""`stiffdice rebuild`: an archive made again from its own content."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
+
+from stiffdice import __version__
+
+if TYPE_CHECKING:
+    from stiffdice.archive.rebuild import Opened
+    from stiffdice.archive.sandbox import Way
+
+EXAMPLES = f"""\
+examples:
+  make archive STUDY=quick
+  stiffdice rebuild results/archives/quick-{__version__}.crate.zip
+  stiffdice rebuild results/archives/quick-{__version__}.crate.zip --cores 4 -o again
+
+Where the archive's code is the installed code, file by file, nothing of a stranger's is executed, and nothing asked.
+Other code is the archive's own: it says so, asks, and runs that in a sandbox (bubblewrap), or not at all. The archive
+is checked first, and not run if anything in it fails. Exit status: 0 if all data and figures are the same, 1 if some
+differ, 2 if the archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    rebuild = commands.add_parser(
+        "rebuild",
+        help="make an archive again from its own content, and compare",
+        description="Make the results in an archive again, with the installed code if that is the archive's, else with "
+        "the archive's own in a sandbox, and compare them with what the archive holds.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    rebuild.add_argument("archive", metavar="ARCHIVE")
+    rebuild.add_argument("-o", "--output", metavar="FOLDER", help="run it in this new folder, and leave it there")
+    rebuild.add_argument("--cores", default="1", metavar="N", help="jobs at once (default: 1)")
+    rebuild.add_argument("--yes", action="store_true", help="run the archive's own code without asking")
+    rebuild.add_argument(
+        "--no-sandbox", action="store_true", help="without a sandbox: its code can read and change all that you can"
+    )
+    rebuild.set_defaults(call=_rebuild)
+
+
+def _rebuild(options: argparse.Namespace) -> int:
+    from stiffdice.cli import output
+    from stiffdice.cli.options import whole
+
+    if options.output is not None:
+        output.name_of("-o", options.output)
+    cores = whole("--cores", options.cores)
+
+    # This takes about a second to import; bad input is told before.
+    from stiffdice.archive.rebuild import opened, rebuild, way_of
+    from stiffdice.cli.progress import Notes
+
+    with _told_to_stop(), ExitStack() as stack:
+        with Notes("rebuild:") as notes:
+            unpacked = stack.enter_context(opened(options.archive, options.output, notes.show))
+            way = way_of(unpacked, not options.no_sandbox)
+        if not unpacked.code.is_installed and not options.yes:
+            _ask(unpacked, way)
+        with Notes("rebuild:") as notes:
+            rebuilt = rebuild(unpacked, way, cores, notes.show)
+    print("\n".join(rebuilt.lines()))
+    return 0 if rebuilt.ok else 1
+
+
+def _ask(unpacked: Opened, way: Way) -> None:
+    """Ask whether to run an archive's own code; raises RefusedError unless the answer, on a terminal, is yes."""
+    from stiffdice.errors import RefusedError, printable
+
+    told = f"{unpacked.archive}: {unpacked.code}"
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        raise RefusedError(f"{told}; nobody is here to be asked whether to run that: --yes runs it {way}")
+    print(f"{printable(told)}\nIt would run the archive's own code, {way}.", file=sys.stderr)
+    print("Run it? [y/N] ", end="", file=sys.stderr, flush=True)
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise RefusedError(f"{unpacked.archive}: not run")
+
+
+@contextmanager
+def _told_to_stop() -> Iterator[None]:
+    """Clean up when told to stop: end what runs, remove what is temporary; the exit status is 128 and the signal's."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    for number in (number for number, handler in before.items() if handler is not signal.SIG_IGN):
+        signal.signal(number, _stop)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    for other in (signal.SIGTERM, signal.SIGHUP):  # the end of a login sends both
+        signal.signal(other, signal.SIG_IGN)
+    sys.exit(128 + number)

@@ -1,0 +1,151 @@
+"""`stiffdice run`: one scene, one file."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+
+from stiffdice.cli import output
+from stiffdice.cli.options import add_changes, number, steps_of, whole
+from stiffdice.errors import printable
+
+EXAMPLES = """\
+examples:
+  stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
+  stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
+  stiffdice run config/scenes/figure-04.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o turning.h5
+  stiffdice run config/scenes/figure-09.yaml --set ground.restitution=0.5 --dt '0.1 ms' -o half.h5
+  stiffdice run config/scenes/figure-09.yaml --simulator numpy --preset as_written --steps 2000 -o theirs.h5
+
+The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
+its verdict; 2 for bad input.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    run = commands.add_parser(
+        "run",
+        help="run one scene and store its trajectory and verdict",
+        description="Run one scene and store its trajectory and verdict in one HDF5 file.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
+    run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
+    run.add_argument(
+        "--model",
+        default="tumbling",
+        metavar="M",
+        help="vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)",
+    )
+    run.add_argument(
+        "--simulator",
+        default="stiffdice",
+        metavar="NAME",
+        help="stiffdice, or another engine where it is installed: mujoco, pybullet, drake, scipy, octave, numpy "
+        "(default: stiffdice)",
+    )
+    run.add_argument(
+        "--scheme",
+        metavar="NAME",
+        help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
+        "or exact where that is known (default: symplectic_euler; another engine has its own)",
+    )
+    steps = run.add_mutually_exclusive_group()
+    steps.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
+    steps.add_argument("--dt", metavar="H", help="in place of --steps: the longest step, as 1e-4 or '0.1 ms' [s]")
+    run.add_argument(
+        "--tolerance",
+        metavar="X",
+        help="of the error, for a scheme that controls its own (default: 1e-9 of the motion)",
+    )
+    run.add_argument(
+        "--every",
+        metavar="K",
+        help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
+    )
+    run.add_argument(
+        "--budget",
+        metavar="N",
+        help="most force evaluations of a run by event, exact or scipy, which take steps of their own, and most steps "
+        "of any other; a run that needs more is stored with the verdict undecided (default: 1e7; all steps)",
+    )
+    run.add_argument(
+        "--ledger",
+        action="store_true",
+        help="book where the energy goes, for every bounce and for the run (takes some times as long)",
+    )
+    output.add_force(run)
+    add_changes(run)
+    run.set_defaults(call=_run)
+
+
+def _run(options: argparse.Namespace) -> None:
+    from stiffdice.io import seal
+    from stiffdice.scene import scene as scenes
+    from stiffdice.scene import validation
+
+    scene = scenes.load(options.scene, options.overrides, options.preset)
+    steps, note = whole("--steps", options.steps), ""
+    if options.dt is not None:
+        steps, note = steps_of(options.dt, scene.duration)
+    target = output.target_of(options.output, options.force, seal.is_sealed, options.scene)
+
+    # These take about a second to import; bad input is told before.
+    from stiffdice.cli.progress import Progress
+    from stiffdice.dynamics import model_selection
+    from stiffdice.integrators import registry as schemes
+    from stiffdice.io.writer import write_dataset
+    from stiffdice.report import run_page
+    from stiffdice.simulation import backend, energy_budget
+    from stiffdice.simulation.dataset import run_dataset
+    from stiffdice.simulation.run import default_every, simulate
+
+    scheme = backend.scheme_of(options.simulator, options.scheme)
+    if options.ledger:
+        validation.choice("--ledger: simulator", options.simulator, [backend.OURS])
+        validation.choice("--ledger: scheme", scheme, energy_budget.BOOKED)
+    every = (
+        default_every(steps)
+        if options.every is None
+        else validation.count("every", whole("--every", options.every), at_most=steps)
+    )
+    tolerance = schemes.TOLERANCE if options.tolerance is None else number("--tolerance", options.tolerance, "1")
+    budget = None if options.budget is None else whole("--budget", options.budget)
+    method = scheme if options.simulator == backend.OURS else ""
+    model, _ = model_selection.chosen(options.model, [scene], scene.duration / steps)
+    backend.check_fit(options.simulator, scheme, scene, model)
+    for line in run_page.doubts(scene, model, method, steps):
+        print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
+    with Progress() as progress:
+        run = simulate(
+            scene,
+            model=options.model,
+            simulator=options.simulator,
+            scheme=scheme,
+            steps=steps,
+            tolerance=tolerance,
+            every=every,
+            budget=budget,
+            progress=progress.show,
+        )
+    dataset = run_dataset(run)
+    if options.ledger:
+        books = energy_budget.keep(scene, model=run.model, scheme=scheme, steps=steps, budget=int(run.steps_done[0]))
+        dataset = dataset.assign(energy_budget.variables(books))
+    write_dataset(dataset, target)
+    for line in filter(None, [*scene.derived, note]):
+        print(printable(line))
+    if options.model == model_selection.AUTO:
+        print(run.model_reason)
+    print("\n".join(map(printable, run_page.lines(run, str(target), _advise(options)))))
+
+
+def _advise(options: argparse.Namespace) -> str:
+    """Return the command that says how accurate such a run is."""
+    words = ["stiffdice", "advise", options.scene]
+    words += [] if options.preset is None else ["--preset", options.preset]
+    words += [word for override in options.overrides for word in ("--set", override)]
+    return shlex.join([*words, "--error", "1%"])

@@ -1,0 +1,44 @@
+"""`stiffdice verify`: whether an archive is what it was when it was made."""
+
+from __future__ import annotations
+
+import argparse
+
+from stiffdice import __version__
+
+EXAMPLES = f"""\
+examples:
+  make archive STUDY=quick
+  stiffdice verify results/archives/quick-{__version__}.crate.zip
+  stiffdice verify results/quick
+  stiffdice run config/scenes/figure-04.yaml -o throw.h5
+  stiffdice verify throw.h5 --json
+
+Nothing of an archive is executed. Exit status: 0 if nothing fails, 1 if something fails, 2 if it cannot be read
+at all. docs/verify.md says what is checked, and how to check it without stiffdice.
+"""
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the command to the parser."""
+    verify = commands.add_parser(
+        "verify",
+        help="check an archive or a folder of results: digests, seals, schema, physics",
+        description="Check an archive or a folder of results: every digest, every file's seal and schema, and whether "
+        "its numbers can be. What fails is named.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verify.add_argument("path", metavar="ARCHIVE|FOLDER", help="an archive, an unpacked one, results, or an .h5 file")
+    verify.add_argument("--json", action="store_true", help="the same for programs")
+    verify.set_defaults(call=_verify)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from stiffdice.archive.verify import verify
+    from stiffdice.cli.progress import Progress
+
+    with Progress() as progress:
+        report = verify(options.path, progress.show)
+    print(report.as_json() if options.json else "\n".join(report.lines()))
+    return 0 if report.ok else 1

@@ -1,0 +1,1 @@
+"""Forces, energies, models and linear theory of a rigid cube on spring-damper ground."""

@@ -1,0 +1,62 @@
+"""What code made a result: a digest of the sources that a module stands on."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+
+
+@cache
+def code_digest(*modules: str) -> str:
+    """Return a SHA-256 over the sources of `modules` and of all that they import from this package.
+
+    modules: dotted names, such as "stiffdice.simulation.run". A script in another language that lies beside a module,
+    under its name, is part of it. A change in a figure leaves the digest of the simulation as it is, so that only what
+    the change touched is computed again.
+    """
+    digest = hashlib.sha256()
+    sources = _closure([_path(name) for name in modules])
+    scripts = {path.with_suffix(".m") for path in sources}
+    for path in sorted(sources | {path for path in scripts if path.is_file()}):
+        digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0")
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def _closure(paths: list[Path | None]) -> set[Path]:
+    found: set[Path] = set()
+    waiting = [path for path in paths if path]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += [part for part in map(_path, _imports(path)) if part]
+    return found
+
+
+@cache
+def _imports(path: Path) -> set[str]:
+    """Return the dotted names that a source file imports from this package, function-level imports included."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    ours = {name for name in names if name.split(".")[0] == PACKAGE.name}
+    # Importing a module runs the packages above it, too; the top one says the version.
+    return {".".join(name.split(".")[:depth]) for name in ours for depth in range(1, name.count(".") + 2)}
+
+
+def _path(name: str) -> Path | None:
+    """Return the source file of a dotted name, or None if it is an object inside a module."""
+    base = PACKAGE.joinpath(*name.split(".")[1:])
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if path.is_file():
+            return path
+    return None

@@ -1,0 +1,1 @@
+"""Which motion is computed: one model per module."""

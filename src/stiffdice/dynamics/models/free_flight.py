@@ -1,0 +1,39 @@
+"""`flying`: the weight alone. For a cube that nothing touches; it turns at the spin of its launch."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import Wrench
+from stiffdice.dynamics.models import sliding, tumbling
+from stiffdice.dynamics.state import Physics
+
+
+class Flying(NamedTuple):
+    """The tag of this model."""
+
+
+TAG = Flying()
+
+# No torque ever changes the spin.
+kick = sliding.kick
+motion = tumbling.motion
+move = tumbling.move
+drift = tumbling.drift
+turn = tumbling.turn
+turns = tumbling.turns
+extent = tumbling.extent
+rises_only = tumbling.rises_only
+
+
+@njit
+def force(law: Any, physics: Physics, state: Any) -> Wrench:
+    """Return the weight [N]: there is no ground."""
+    return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+
+
+@njit
+def touches() -> bool:
+    """Return that the ground never acts on the body."""
+    return False

@@ -1,0 +1,61 @@
+"""`vertical`: the height alone, on level ground. The cube keeps its orientation and its place on the ground.
+
+Where `sliding` has no tangential motion it is the same to the last bit: friction is then nothing, and the forces on the
+nodes are summed in the same order.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import Wrench, normal_force, reaches
+from stiffdice.dynamics.models import sliding
+from stiffdice.dynamics.state import Physics
+
+
+class Vertical(NamedTuple):
+    """The tag of this model."""
+
+
+TAG = Vertical()
+
+# Its launch has no velocity along the ground, and nothing gives it one.
+motion = sliding.motion
+move = sliding.move
+turn = sliding.turn
+turns = sliding.turns
+touches = sliding.touches
+extent = sliding.extent
+
+
+@njit
+def force(law: Any, physics: Physics, state: Any) -> Wrench:
+    """Return the normal forces and the weight [N]; friction and torque are left out."""
+    z, speed = state.position[2], state.velocity[2]
+    if not reaches(law, z - physics.reach):
+        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+    nodes = state.node_offset
+    fz = 0.0
+    for k in range(nodes.shape[0]):
+        push = normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping)
+        fz += push - physics.node_weight
+    return 0.0, 0.0, fz, 0.0, 0.0, 0.0
+
+
+@njit
+def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
+    """Advance the vertical velocity by h [s] under a force (equation 6)."""
+    state.velocity[2] += h * wrench[2] / physics.mass
+
+
+@njit
+def drift(physics: Physics, state: Any, h: float) -> None:
+    """Advance the height by h [s] at the state's velocity (equation 7)."""
+    state.position[2] += h * state.velocity[2]
+
+
+@njit
+def rises_only() -> bool:
+    """Return that the body moves up and down only."""
+    return True

@@ -1,0 +1,123 @@
+"""What a kernel works on: the state of one rigid body, and the physics it moves in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from stiffdice.dynamics.rotation import rotated
+from stiffdice.errors import InputError
+from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+States = npt.NDArray[np.void]  # of STATE
+
+
+# A rigid body; kernels change it in place. position [m], velocity [m/s], angular_momentum [kg m²/s], angular_velocity
+# [rad/s], the last as the nodes' velocities use it; node_offset [m]: relative to the centre (the listings' X_rel).
+# One record is one state; an array of records is an ensemble or a trajectory. Records reach compiled code as bare
+# pointers, where tuples of arrays would cost a reference count at every call (20 times the work of a step).
+STATE = np.dtype(
+    [
+        ("position", np.float64, 3),
+        ("velocity", np.float64, 3),
+        ("angular_momentum", np.float64, 3),
+        ("angular_velocity", np.float64, 3),
+        ("node_offset", np.float64, (len(SIGNS), 3)),
+    ]
+)
+
+
+# Velocity [m/s] and spin [rad/s] of a body, or what they come to in a step: a shift [m] and a rotation vector [rad].
+Motion = tuple[float, float, float, float, float, float]
+
+
+class Physics(NamedTuple):
+    """The numbers of a scene that the forces need; SI units, the ground's constants per node."""
+
+    mass: float
+    gravity: float
+    inertia: float
+    stiffness: float
+    damping: float
+    friction: float
+    nx: float
+    ny: float
+    nz: float
+    cutoff: float  # [m/s] of regularised friction: 1e-6 r in the listings
+    node_weight: float  # [N]
+    weight: float  # [N] of all nodes, summed one by one as the listings sum forces
+    reach: float  # [m] no node is farther from the centre
+    radius: float  # [m] the cube's nominal one
+    side: float  # [m]
+
+
+def physics_of(scene: Scene) -> Physics:
+    """Return the scene's numbers as a kernel takes them."""
+    nodes = scene.cube.node_offsets()
+    node_weight = scene.cube.mass / len(nodes) * scene.gravity
+    weight = 0.0
+    for _ in nodes:
+        weight += node_weight
+    return Physics(
+        scene.cube.mass,
+        scene.gravity,
+        scene.cube.moment_of_inertia,
+        scene.ground.stiffness,
+        scene.ground.damping,
+        scene.ground.friction,
+        *scene.ground.normal,
+        cutoff=1e-6 * scene.cube.radius,
+        node_weight=node_weight,
+        weight=weight,
+        # The margin covers what rotating the nodes step by step can add in round-off.
+        reach=float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6),
+        radius=scene.cube.radius,
+        side=scene.cube.side,
+    )
+
+
+# The models that turn the cube; the others leave its spin out.
+TURNING = frozenset({"tumbling", "flying"})
+# The models in which the ground acts on the cube.
+TOUCHING = frozenset({"vertical", "sliding", "tumbling"})
+
+
+def start_of(scene: Scene, model: str) -> States:
+    """Return the state at the launch, shape (1,).
+
+    Without spin for a model that does not turn the cube; for `vertical` without horizontal velocity, too.
+    Raises InputError for `vertical` on ground that is not level.
+    """
+    launch = scene.launch
+    state = np.zeros(1, STATE)
+    state["position"] = launch.position
+    state["velocity"] = launch.velocity
+    if model == "vertical":
+        _check_level(scene)
+        state["velocity"][:, :2] = 0.0
+    if model in TURNING:
+        state["angular_momentum"] = launch.spin
+        if launch.node_velocity == "rigid":
+            state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
+    state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
+    return state
+
+
+def _check_level(scene: Scene) -> None:
+    if scene.ground.normal != (0.0, 0.0, 1.0):
+        normal = ", ".join(f"{part:g}" for part in scene.ground.normal)
+        raise InputError(
+            f"model = vertical: ground.normal = [{normal}]; allowed is level ground, [0, 0, 1], as the model moves the "
+            "cube up and down only"
+        )
+
+
+class Ensemble(NamedTuple):
+    """The launches of members, and how late [s] each enters the scene's flight; shape (member,) each."""
+
+    launches: States
+    late: Array

@@ -1,0 +1,1 @@
+"""The same contact, throw and limits in every engine."""

@@ -1,0 +1,98 @@
+"""Chatter: what friction makes of a cube at rest, against the step size.
+
+Friction is regularised: a step takes k v/(v + cutoff) from a sliding speed v, with k = mu g h for the cube's weight. At
+k > 2 cutoff standing still is unstable, and the cube swings to and fro from step to step by k/2 − cutoff, whatever its
+stiffness, damping and launch; below, it comes to rest.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.state import physics_of
+from stiffdice.errors import InputError
+from stiffdice.experiments.failure_map import STARTS
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.run import simulate
+
+MODEL, SCHEME = "sliding", "symplectic_euler"
+
+# Steps from the start on that are looked at for the swing.
+_SEEN = 200
+
+# ωh of the cube on its ground: above, the bounce is unstable, too.
+_LONGEST = 1.5
+
+
+def measure(
+    scene: Scene,
+    *,
+    friction: Sequence[float] = (0.01, 0.075, 1.0),
+    step_size: Sequence[float] = tuple(np.logspace(-8, -2.5, 23)),
+    steps: int = 4000,
+) -> xr.Dataset:
+    """Return the swing of the sliding speed of a cube at rest [m/s], measured and by theory.
+
+    scene: gives the cube, gravity, stiffness and damping; the experiment puts the cube at rest on level ground under
+    the gated law, sliding at first with three steps' friction. friction: coefficients. step_size [s]: up to ωh = 1.5.
+    steps: how many are taken, and more where the swing needs them to settle; it is that of the last 200.
+    Dimensions friction, step_size; `least_step` has friction: the step size from which on theory says it chatters.
+
+    Raises InputError for a number out of range, and for a scene in which the cube does not rest on four nodes.
+    """
+    coefficients = [validation.number("friction", value, "1", above=0) for value in friction]
+    steps = validation.count("steps", steps, at_least=2 * _SEEN)
+    level = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated")
+    stiffness, weight = scene.ground.stiffness, scene.cube.mass * scene.gravity
+    if not 0 < weight < linear_theory.BOUNCE_NODES * stiffness * scene.cube.side / 2:
+        raise InputError(
+            f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: allowed are those with which the cube "
+            "rests on its lower face"
+        )
+    longest = _LONGEST / linear_theory.contact_frequency(stiffness, scene.cube.mass)
+    sizes = [validation.number("step_size", size, "s", above=0) for size in step_size]
+    if max(sizes) > longest:
+        raise InputError(f"step_size = {max(sizes):g}: allowed are numbers <= {longest:.3g} [s], ωh = {_LONGEST:g}")
+    cutoff = physics_of(scene).cutoff
+    theoretical = np.array([[max(0.0, mu * scene.gravity * h / 2 - cutoff) for h in sizes] for mu in coefficients])
+    swings = [[_swing(level, mu, h, steps) for h in sizes] for mu in coefficients]
+    grid = ("friction", "step_size")
+    variables: dict[str, Any] = {
+        "swing": (grid, swings, {"long_name": "largest sliding speed of a cube at rest", "units": "m s-1"}),
+        "swing_theory": (grid, theoretical, {"long_name": "mu g h/2 - cutoff, or nothing", "units": "m s-1"}),
+        "least_step": (
+            grid[:1],
+            [2 * cutoff / (mu * scene.gravity) for mu in coefficients],
+            {"long_name": "step size from which on a cube at rest chatters, 2 cutoff/(mu g)", "units": "s"},
+        ),
+    }
+    coordinates = {
+        "friction": ("friction", coefficients, {"long_name": "friction coefficient", "units": "1"}),
+        "step_size": ("step_size", sizes, {"long_name": "step size", "units": "s"}),
+    }
+    attributes = dataset.provenance_attributes(
+        "Chatter of a cube at rest", level, MODEL, SCHEME, "stiffdice.experiments.friction_chatter"
+    )
+    attributes["scene_note"] = "friction and launch are the experiment's, not the scene's; ground: level, gated"
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def _swing(level: Scene, friction: float, h: float, steps: int) -> float:
+    """Return the largest sliding speed [m/s] in the last steps of a cube that slid slowly, and should have stopped."""
+    still = STARTS["at_rest"](level.with_ground(friction=friction))
+    sliding = dataclasses.replace(still.launch, velocity=(3 * friction * level.gravity * h, 0.0, 0.0))
+    # In a step what is off the swing shrinks by 1 − 4 cutoff/k: to 1e-4 in so many.
+    settling = round(2.5 * friction * level.gravity * h / physics_of(level).cutoff)
+    steps += settling
+    scene = dataclasses.replace(still, launch=sliding, duration=h * steps)
+    run = simulate(scene, model=MODEL, scheme=SCHEME, steps=steps, every=1)
+    assert run.trajectory is not None
+    return float(np.abs(run.trajectory.state["velocity"][-_SEEN:, 0]).max())

@@ -1,0 +1,255 @@
+"""What double precision itself cannot do, whatever the scheme: predicted from a scene, and found in this code.
+
+Each limit is one number. The measured one is the edge between two outcomes of this code's runs or sums, by bisection in
+its logarithm: each of these outcomes changes just once. The growth of round-off is that of the distance between two
+runs that start a few units in the last place apart.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.errors import InputError
+from stiffdice.experiments.failure_map import STARTS
+from stiffdice.io.cf_enums import enum_attributes
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.run import Run, simulate
+
+MODEL, SCHEME = "sliding", "symplectic_euler"
+LARGEST = float(np.finfo(float).max)
+
+# By limit: what is stored of it, and its unit.
+LIMITS: dict[str, tuple[str, str]] = {
+    "spring_at_rest": ("stiffness from which the springs' energy at rest is lost in m g z", "kg s-2"),
+    "sag_in_height": ("stiffness from which the sag at rest is lost in the height", "kg s-2"),
+    "spring_at_deepest": ("springs' energy at the deepest point of the landing, in units in the last place", "1"),
+    "way_in_place": ("step size up to which a step at the launch's speed is lost in its height", "s"),
+    "pull_in_speed": ("step size up to which a step's gravity is lost in the launch's speed", "s"),
+    "first_fall": ("step size up to which a cube let go from rest does not begin to fall", "s"),
+    "growth": ("factor by which round-off grows in a bounce", "1"),
+    "square_of_frequency": ("stiffness from which omega^2 leaves the range of doubles", "kg s-2"),
+    "first_contact": ("stiffness from which the first contact of a coarse run leaves the range of doubles", "kg s-2"),
+}
+
+# Units in the last place between the launches of a pair: one may be lost where the flight goes higher.
+_APART = 16
+
+Found = tuple[float, float]  # predicted, measured
+
+
+def measure(
+    scene: Scene, *, stiffness: float = 1.0e6, omega_h: float = 0.3, coarse: int = 10, members: int = 64
+) -> xr.Dataset:
+    """Return LIMITS of a scene, predicted and measured; dimension limit.
+
+    stiffness [kg/s²], omega_h [1]: of the bounces through which round-off is followed. coarse: in so many steps of the
+    scene's duration the run begins whose first contact is to leave the range. members: pairs of runs, spread over the
+    phase of the touch-down, whose growth is averaged in its logarithm.
+    The experiment puts the cube on level ground, gated, without damping and friction.
+
+    Raises InputError for a number out of range and for a scene without gravity, or not launched up from above the
+    ground.
+    """
+    stiffness = validation.number("stiffness", stiffness, "kg/s²", above=0)
+    omega_h = validation.number("omega_h", omega_h, "1", above=0)
+    coarse, members = validation.count("coarse", coarse), validation.count("members", members)
+    bare = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated", damping=0.0, friction=0.0)
+    if not (bare.gravity > 0 and bare.launch.velocity[2] > 0 and _clearance(bare) > 0 and omega_h < 1):
+        raise InputError("allowed are launches up from above the ground, under gravity, and omega_h < 1")
+    stiff = bare.with_ground(stiffness=stiffness)
+    found: dict[str, Found] = {
+        "spring_at_rest": _spring_at_rest(bare),
+        "sag_in_height": _sag_in_height(bare),
+        "spring_at_deepest": _spring_at_deepest(stiff),
+        "way_in_place": _way_in_place(bare),
+        "pull_in_speed": _pull_in_speed(bare),
+        "first_fall": _first_fall(bare),
+        "growth": _growth(stiff, omega_h, members),
+        "square_of_frequency": _square_of_frequency(bare),
+        "first_contact": _first_contact(bare, coarse),
+    }
+    numbers = np.array([found[name] for name in LIMITS])
+    # Each limit has a unit of its own, which no `units` could say of all.
+    unit = "in the unit that limit_units names"
+    attributes = dataset.provenance_attributes(
+        "Limits of double precision", bare, MODEL, SCHEME, "stiffdice.experiments.precision_limits"
+    )
+    attributes |= {
+        "scene_note": "ground: level, gated, without damping and friction; stiffness as the limit says",
+        "limit_meanings": "; ".join(f"{name}: {what}" for name, (what, _) in LIMITS.items()),
+        "limit_units": "; ".join(f"{name}: {units}" for name, (_, units) in LIMITS.items()),
+        "bounce_stiffness": stiffness,
+        "bounce_omega_h": omega_h,
+        "coarse": coarse,
+    }
+    return xr.Dataset(
+        {
+            "predicted": ("limit", numbers[:, 0], {"long_name": f"limit by its formula, {unit}", "units": "1"}),
+            "measured": ("limit", numbers[:, 1], {"long_name": f"limit found in this code, {unit}", "units": "1"}),
+        },
+        {"limit": ("limit", np.arange(len(LIMITS), dtype=np.int8), enum_attributes("limit", list(LIMITS)))},
+        attributes,
+    )
+
+
+def _clearance(scene: Scene) -> float:
+    return scene.launch.position[2] - scene.cube.side / 2
+
+
+def _half_unit(value: float) -> float:
+    """Return half a unit in the last place below a positive value: less, taken from it, is lost."""
+    return float(value - np.nextafter(value, 0.0)) / 2
+
+
+def _edge(below: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the number from low to high up to which `below` holds, to nine digits."""
+    assert below(low)
+    assert not below(high)
+    while high / low > 1 + 1e-9:
+        middle = math.sqrt(low) * math.sqrt(high)
+        low, high = (middle, high) if below(middle) else (low, middle)
+    return low
+
+
+def _launched(scene: Scene, **launch: Any) -> Scene:
+    return dataclasses.replace(scene, launch=dataclasses.replace(scene.launch, **launch))
+
+
+def _run(scene: Scene, h: float, steps: int, every: int | None = None) -> Run:
+    there = dataclasses.replace(scene, duration=h * steps)
+    return simulate(there, model=MODEL, scheme=SCHEME, steps=steps, every=every or steps)
+
+
+def _spring_at_rest(scene: Scene) -> Found:
+    """½ S d² of four nodes at d = m g/(4S) is (m g)²/(8S); half a unit in the last place of m g z is lost in it."""
+    weight, side = scene.cube.mass * scene.gravity, scene.cube.side
+    predicted = weight**2 / 8 / _half_unit(weight * side / 2)
+
+    def shows(stiffness: float) -> bool:
+        ground = scene.with_ground(stiffness=stiffness)
+        _, potential, _ = energies(physics_of(ground), start_of(STARTS["touching"](ground), MODEL))
+        sag = weight / 4 / stiffness
+        return bool(potential[0] - 4 * (stiffness * sag * sag / 2) != potential[0])
+
+    return predicted, _edge(shows, predicted / 1e6, predicted * 1e6)
+
+
+def _sag_in_height(scene: Scene) -> Found:
+    """A cube at rest stands m g/(4S) lower than one that just touches."""
+    predicted = scene.cube.mass * scene.gravity / 4 / _half_unit(scene.cube.side / 2)
+
+    def shows(stiffness: float) -> bool:
+        ground = scene.with_ground(stiffness=stiffness)
+        return STARTS["at_rest"](ground).launch.position != STARTS["touching"](ground).launch.position
+
+    return predicted, _edge(shows, predicted / 1e6, predicted * 1e6)
+
+
+def _spring_at_deepest(scene: Scene) -> Found:
+    """There the springs hold m v²/2 and the weight's work on the way, m g d: no stiffness lets them drown."""
+    mass, gravity = scene.cube.mass, scene.gravity
+    omega = linear_theory.contact_frequency(scene.ground.stiffness, mass)
+    fall, fast = _landing(scene)
+    depth = gravity / omega**2 + math.hypot(gravity / omega**2, fast / omega)
+    unit = float(np.spacing(mass * gravity * abs(scene.cube.side / 2 - depth)))
+    h = 0.01 / omega
+    run = _run(scene, h, math.ceil((fall + 3 / omega) / h), every=1)
+    assert run.trajectory is not None
+    return (mass * fast**2 / 2 + mass * gravity * depth) / unit, float(run.trajectory.elastic_energy.max()) / unit
+
+
+def _landing(scene: Scene) -> Found:
+    """Return when [s] and how fast [m/s] the launch lands."""
+    up = scene.launch.velocity[2]
+    fast = math.sqrt(up**2 + 2 * scene.gravity * _clearance(scene))
+    return (up + fast) / scene.gravity, fast
+
+
+def _way_in_place(scene: Scene) -> Found:
+    height, speed = scene.launch.position[2], scene.launch.velocity[2]
+    predicted = float(np.spacing(height)) / 2 / speed
+    return predicted, _edge(
+        lambda h: _run(scene, h, 1).end["position"][0, 2] == height, predicted / 1e3, predicted * 1e3
+    )
+
+
+def _pull_in_speed(scene: Scene) -> Found:
+    speed = scene.launch.velocity[2]
+    predicted = _half_unit(speed) / scene.gravity
+    return predicted, _edge(
+        lambda h: _run(scene, h, 1).end["velocity"][0, 2] == speed, predicted / 1e3, predicted * 1e3
+    )
+
+
+def _first_fall(scene: Scene) -> Found:
+    """The first step falls by g h²."""
+    still, height = _launched(scene, velocity=(0.0, 0.0, 0.0)), scene.launch.position[2]
+    predicted = math.sqrt(_half_unit(height) / scene.gravity)
+    return predicted, _edge(
+        lambda h: _run(still, h, 1).end["position"][0, 2] == height, predicted / 1e3, predicted * 1e3
+    )
+
+
+def _growth(scene: Scene, omega_h: float, members: int) -> Found:
+    """Round-off in the place at touch-down is one of phase α = d/(hv), hence of e², of the speed out, of the flight.
+
+    With θ the angle of a step, 2 sin(θ/2) = ωh, and κ the fraction of a step in π/θ, the place after lift-off is
+    β = κ − α steps, or one more, and e² − 1 = (ωh)²(β(1 − β) − α(1 − α)): its slope in α is 2(ωh)²κ, or −2(ωh)²(1 − κ)
+    for the part κ of all phases. A speed v e at lift-off changes the flight by 2 v δe/g, and the next place by v times
+    that. So a bounce multiplies by v ω² h/g times 2κ or 2(1 − κ): their mean is taken in the logarithm.
+    """
+    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    h = omega_h / omega
+    fall, fast = _landing(scene)
+    kappa = math.modf(math.pi / (2 * math.asin(omega_h / 2)))[0]
+    predicted = fast * omega * omega_h / scene.gravity * (2 * (1 - kappa)) ** kappa * (2 * kappa) ** (1 - kappa)
+    flight = 2 * fast / scene.gravity
+    logs = []
+    for member in range(members):
+        height = scene.launch.position[2] + member / members * fast * h
+        first, third = (_apart(scene, height, h, math.ceil((fall + (bounce - 0.5) * flight) / h)) for bounce in (1, 3))
+        if first > 0 and third > 0:  # or they have fallen together
+            logs.append(math.log(third / first) / 2)
+    return predicted, math.exp(float(np.mean(logs)))
+
+
+def _apart(scene: Scene, height: float, h: float, steps: int) -> float:
+    """Return by how much the speeds of two runs differ that are launched some units in the last place apart [m/s]."""
+    x, y, _ = scene.launch.position
+    heights = height, height + _APART * float(np.spacing(height))
+    ends = [_run(_launched(scene, position=(x, y, z)), h, steps).end["velocity"][0, 2] for z in heights]
+    return float(abs(ends[1] - ends[0]))
+
+
+def _square_of_frequency(scene: Scene) -> Found:
+    mass = scene.cube.mass
+    return LARGEST * mass / 4, _edge(lambda stiffness: 4 * stiffness / mass < math.inf, 1.0, LARGEST)
+
+
+def _first_contact(scene: Scene, coarse: int) -> Found:
+    """The sum of all S d must be in range, and place and speed after the step of h/m times that, added."""
+    h, (_, _, up), low = scene.duration / coarse, scene.launch.velocity, _clearance(scene)
+    steps = 1
+    while low + steps * h * up - scene.gravity * h * h * steps * (steps + 1) / 2 >= 0:
+        steps += 1
+    depth = -(low + steps * h * up - scene.gravity * h * h * steps * (steps + 1) / 2)
+    depths = 4 * (depth + max(0.0, depth - scene.cube.side))
+    predicted = LARGEST / depths / max(1.0, h / scene.cube.mass * (1 + h))
+
+    def inside(stiffness: float) -> bool:
+        run = _run(scene.with_ground(stiffness=stiffness), h, steps + 1)
+        return bool(run.verdict[0] != Verdict.LEFT_NUMERIC_RANGE)
+
+    return predicted, _edge(inside, predicted / 1e3, min(predicted * 1e3, LARGEST))

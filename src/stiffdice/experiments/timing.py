@@ -1,0 +1,107 @@
+"""How long things take: medians of interleaved rounds, and the machine they were taken on.
+
+Times differ from one rebuild to the next, so they live apart from the data, as benchmarks do.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiffdice.dynamics.state import Array
+
+# A clock is read before and after so many seconds at least, that reading it takes no time of what it measures.
+SHORTEST = 1e-3
+
+_PACKAGES = ("stiffdice", "numpy", "numba", "scipy")
+
+
+@dataclass(frozen=True)
+class Launched:
+    """A run that is made ready before each call, off the clock: `ready` returns what is timed."""
+
+    ready: Callable[[], Callable[[], Any]]
+
+    def __call__(self) -> object:
+        """Make the run ready, and make it."""
+        return self.ready()()
+
+
+class Times(NamedTuple):
+    """Of each of some runs: the median time of a call [s], and half the range between the quartiles over it [1].
+
+    Shape (run,) each.
+    """
+
+    median: Array
+    spread: Array
+
+
+def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: float) -> Times:
+    """Return how long runs take: one after the other in each round, so that a slow moment of the machine hits all.
+
+    Runs are warm: each has been called before. affordable [s]: one that takes longer is called once.
+    """
+    once = [seconds_of(run) for run in runs]
+    repeats = [math.ceil(SHORTEST / max(seconds, 1e-9)) for seconds in once]
+    samples: list[list[float]] = [[] if seconds <= affordable else [seconds] for seconds in once]
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(rounds):
+            for k, run in enumerate(runs):
+                if once[k] <= affordable:
+                    samples[k].append(seconds_of(run, repeats[k]))
+    finally:
+        gc.enable()
+    quartiles = np.array([np.quantile(part, (0.25, 0.5, 0.75)) for part in samples]).reshape(-1, 3)
+    return Times(quartiles[:, 1], (quartiles[:, 2] - quartiles[:, 0]) / 2 / quartiles[:, 1])
+
+
+def seconds_of(run: Callable[[], object], repeats: int = 1) -> float:
+    """Return the wall time of a call [s], the mean of so many in a row."""
+    if isinstance(run, Launched):
+        return sum(seconds_of(run.ready()) for _ in range(repeats)) / repeats
+    begun = time.perf_counter()
+    for _ in range(repeats):
+        run()
+    return (time.perf_counter() - begun) / repeats
+
+
+def machine() -> dict[str, Any]:
+    """Return the attributes that say where and with what times were taken."""
+    return {
+        "machine_processor": _processor(),
+        "machine_cores": os.cpu_count() or 0,
+        "machine_load_1_minute": round(os.getloadavg()[0], 2),
+        "machine_system": platform.platform(),
+        "versions": "; ".join([f"python {sys.version.split()[0]}", *filter(None, map(_told, _PACKAGES))]),
+        "measured_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _told(package: str) -> str:
+    try:
+        return f"{package} {version(package)}"
+    except PackageNotFoundError:
+        return ""

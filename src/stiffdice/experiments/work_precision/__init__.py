@@ -1,0 +1,1 @@
+"""Accuracy against cost, by scheme and solver."""

@@ -1,0 +1,157 @@
+"""The problems that every method is tried on: a scene each, and how far off a run of it is.
+
+All are on level ground under the gated law. A path is known at the launch and after SAMPLES equal parts of its time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from stiffdice.dynamics import flat_bounce
+from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.rotation import rotated
+from stiffdice.dynamics.state import Array, States, physics_of, start_of
+from stiffdice.errors import InputError
+from stiffdice.scene.scene import Scene
+
+# Few, so that keeping them costs next to nothing; between two of them there is a flight after the first landing.
+SAMPLES = 12
+
+# By measure: what is stored of it.
+MEASURES = {
+    "position": "root mean square distance of the centre from the reference over the samples, in radii",
+    "restitution": "error of the centre's speed up from the first landing over its speed down",
+    "energy": "error of the energy at the end, over that of the launch",
+}
+
+
+class Problem(NamedTuple):
+    """A kind of motion: the model that computes it, whether the ground rubs, and how it is called in a figure."""
+
+    model: str
+    rubs: bool
+    name: str
+
+    @property
+    def turns(self) -> bool:
+        """Whether the cube keeps the launch's spin and orientation, and so lands on its corners."""
+        return self.model == "tumbling"
+
+
+PROBLEMS: dict[str, Problem] = {
+    "flat-bounce": Problem("sliding", False, "flat bounce"),
+    "sliding-bounce": Problem("sliding", True, "sliding bounce with friction"),
+    "tumbling-throw": Problem("tumbling", True, "tumbling throw"),
+}
+
+
+def scene_of(problem: Problem, scene: Scene, stiffness: float) -> Scene:
+    """Return the problem's scene on the cube, launch and ground of another, at one stiffness [kg/s²].
+
+    Raises InputError for a launch that is not from above the ground, under gravity.
+    """
+    friction = scene.ground.friction if problem.rubs else 0.0
+    scene = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated", stiffness=stiffness, friction=friction)
+    if not problem.turns:
+        flat = dataclasses.replace(scene.launch, angular_momentum=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0))
+        scene = dataclasses.replace(scene, launch=flat)
+    scene = dataclasses.replace(scene, launch=dataclasses.replace(scene.launch, node_velocity="rigid"))
+    if scene.gravity == 0 or not _clearance(scene, 0.0) > 0:
+        raise InputError("allowed are launches from above the ground, under gravity")
+    return scene
+
+
+def _clearance(scene: Scene, time: float) -> float:
+    """Return how far the lowest node is above the ground [m], so long [s] after the launch, in free flight."""
+    launch = scene.launch
+    turned = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
+    turned = rotated(turned, np.array(launch.spin) / scene.cube.moment_of_inertia * time)
+    return float(_height(scene, time) + turned[:, 2].min())
+
+
+def _height(scene: Scene, time: float) -> float:
+    return scene.launch.position[2] + scene.launch.velocity[2] * time - scene.gravity * time**2 / 2
+
+
+def touchdown(scene: Scene) -> float:
+    """Return the centre's height [m] when the launch first touches the ground; found to a sixtieth of a sample first.
+
+    Raises InputError if it does not within the duration.
+    """
+    times = np.linspace(0, scene.duration, 60 * SAMPLES + 1)
+    below = next((k for k, time in enumerate(times) if _clearance(scene, time) <= 0), None)
+    if below is None:
+        raise InputError(f"duration = {scene.duration:g}: allowed is one in which the cube lands [s]")
+    early, late = float(times[below - 1]), float(times[below])
+    while early < (middle := (early + late) / 2) < late:
+        early, late = (middle, late) if _clearance(scene, middle) > 0 else (early, middle)
+    return _height(scene, late)
+
+
+class Judge:
+    """How far off paths of one problem's scene are."""
+
+    def __init__(self, problem: Problem, scene: Scene, reference: States) -> None:
+        """Take the scene (of `scene_of`) and the states that are right; raises InputError if it stays on the ground."""
+        self._scene, self._problem, self._reference = scene, problem, reference
+        self._height = touchdown(scene)
+        self._after = _next_flight(scene, reference)
+        self._launch_energy = float(_energy(scene, start_of(scene, problem.model))[0])
+        self._end_energy = float(_energy(scene, reference[-1:])[0])
+        self._restitution = self._speeds(reference, 0.0)
+
+    def errors(self, states: States, lead: float = 0.0) -> dict[str, float]:
+        """Return the error by each of MEASURES; not-a-number where a run left the range of doubles.
+
+        lead [s]: by how much the velocity is behind the place, as the scheme's LAG says.
+        """
+        with np.errstate(all="ignore"):
+            away = states["position"] - self._reference["position"]
+            found = {
+                "position": math.sqrt(float(np.mean((away**2).sum(axis=1)))) / self._scene.cube.radius,
+                "restitution": self._restitution_error(states, lead),
+                "energy": abs(float(_energy(self._scene, states[-1:])[0]) - self._end_energy) / self._launch_energy,
+            }
+        return {name: value if math.isfinite(value) else math.nan for name, value in found.items()}
+
+    def _restitution_error(self, states: States, lead: float) -> float:
+        down, up = self._speeds(states, lead)
+        if self._problem.turns:
+            wanted_down, wanted_up = self._restitution
+            return abs(up / down - wanted_up / wanted_down)
+        return abs(up / down - flat_bounce.restitution(self._scene, down)) if 0 < down < math.inf else math.nan
+
+    def _speeds(self, states: States, lead: float) -> tuple[float, float]:
+        """Return the centre's speed down and up [m/s] at the height of the first touch, on the flights' parabolas."""
+        known = states[[0, self._after]]
+        slopes = known["velocity"][:, 2] - lead * self._scene.gravity
+        squares = slopes**2 + 2 * self._scene.gravity * (known["position"][:, 2] - self._height)
+        down, up = np.sqrt(np.maximum(squares, 0.0)).tolist()
+        return down, up
+
+
+def _next_flight(scene: Scene, states: States) -> int:
+    """Return the first sample after the first landing from which on the cube flies until the next."""
+    flown = _flown(scene, states)
+    landed = int(np.argmin(flown))
+    later = np.flatnonzero(flown[landed:])
+    if flown.all() or not later.size:
+        raise InputError(f"ground.stiffness = {scene.ground.stiffness:g}: the cube does not leave the ground in time")
+    return landed + int(later[0])
+
+
+def _flown(scene: Scene, states: States) -> Array:
+    """Return whether between two samples nothing but gravity acted, shape (sample,)."""
+    fall = scene.gravity * scene.duration / (len(states) - 1)
+    change = np.diff(states["velocity"], axis=0) + np.array([0.0, 0.0, fall])
+    twist = np.diff(states["angular_momentum"], axis=0)
+    return np.asarray((np.abs(change).max(axis=1) < 1e-5 * fall) & (np.abs(twist).max(axis=1) < 1e-5))
+
+
+def _energy(scene: Scene, states: States) -> Array:
+    """Return kinetic, potential and elastic energy [J], shape (state,)."""
+    return np.asarray(sum(energies(physics_of(scene), states)))

@@ -1,0 +1,128 @@
+"""How long the runs of `work_precision` take: every scheme's plain stepping, and the outside peers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from stiffdice.dynamics.state import start_of
+from stiffdice.experiments.timing import Launched, Times, interleaved, machine, seconds_of
+from stiffdice.experiments.work_precision.effort import ALL, Effort, chosen_from, fixed_step, ladder, plain
+from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Problem, scene_of
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import dataset
+from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines.registry import ENGINES
+
+
+class Rung(NamedTuple):
+    """One run on a ladder, and how long its first call took [s]."""
+
+    effort: Effort
+    run: Callable[[], object]
+    first: float
+
+
+# Of a fixed step's ladder so many rungs are timed, the longest that are affordable: time is proportional to steps.
+_RUNGS = 3
+# Any other ladder ends with the run that takes so many times what is affordable.
+_END = 3
+
+
+def time(
+    scene: Scene,
+    *,
+    problem: str = "flat-bounce",
+    methods: Sequence[str] = (ALL,),
+    stiffness: Sequence[float] = (1e2, 1e4, 1e6, 1e8, 1e10, 1e12),
+    per_decade: int = 2,
+    affordable: float = 0.03,
+    rounds: int = 7,
+) -> xr.Dataset:
+    """Return median times [s], dimensions stiffness, method, effort (NaN past a ladder's end).
+
+    problem, methods, stiffness, per_decade: as for the experiment `work-precision`. affordable [s]: longer runs are
+    timed once. The ladder of a fixed step ends there, as above it `seconds_per_step` says, any other after three times
+    that. rounds: in each every run is timed; the median is told. `first_seconds` is a method's first call in a fresh
+    process, which loads compiled code, or compiles it if nobody has; everything else is warm.
+
+    Raises InputError as the experiment does.
+    """
+    chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
+    grounds = [validation.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
+    affordable = validation.number("affordable", affordable, "s", above=0)
+    per_decade, rounds = validation.count("per_decade", per_decade), validation.count("rounds", rounds)
+    names = chosen_from(chosen, methods)
+    climbed, times = [], []
+    for value in grounds:
+        ground = scene_of(chosen, scene, value)
+        climbed.append([_climbed(chosen, ground, name, per_decade, affordable) for name in names])
+        times.append(interleaved([rung.run for rungs in climbed[-1] for rung in rungs], rounds, affordable))
+    attributes = dataset.provenance_attributes(
+        f"Time of work and precision: {chosen.name}",
+        scene,
+        chosen.model,
+        "method",
+        "stiffdice.experiments.work_precision.time",
+    ) | {"problem": problem, "samples": SAMPLES, "rounds": rounds}
+    attributes |= stepper.attributes(names)
+    first = [rungs[0].first for rungs in climbed[0]]
+    variables = _variables(climbed, times, names) | {
+        "first_seconds": ("method", first, {"long_name": "first call in a fresh process", "units": "s"}),
+    }
+    return xr.Dataset(variables, dataset.method_coordinates(grounds, names), attributes | machine())
+
+
+def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affordable: float) -> list[Rung]:
+    """Return the rungs to be timed, called once each, the first twice."""
+    rungs: list[Rung] = []
+    took = 0.0
+    for effort in ladder(scene, method, per_decade, math.inf):
+        if fixed_step(method) and rungs and took * effort.steps / rungs[-1].effort.steps > affordable:
+            break
+        run = _timed(problem, scene, method, effort)
+        first = took = seconds_of(run)
+        if not rungs:  # it may have compiled
+            took = seconds_of(run)
+        rungs.append(Rung(effort, run, first))
+        if took > _END * affordable:
+            break
+    return rungs[-_RUNGS:] if fixed_step(method) else rungs
+
+
+def _timed(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], object]:
+    """Return a run to be timed; an engine builds its model of the scene before."""
+    if method not in ENGINES:
+        return plain(problem, scene, method, effort)
+    launch = start_of(scene, problem.model)
+    return Launched(stepper.ready(method, scene, problem.model, launch, effort.steps, SAMPLES))
+
+
+def _variables(
+    climbed: Sequence[Sequence[Sequence[Rung]]], times: Sequence[Times], names: Sequence[str]
+) -> dict[str, Any]:
+    shape = len(climbed), len(names), max(len(rungs) for row in climbed for rungs in row)
+    numbers = {name: np.full(shape, np.nan) for name in ("tolerance", "seconds", "spread")}
+    steps, per_step = np.zeros(shape, np.int64), np.full(shape[:2], np.nan)
+    for i, row in enumerate(climbed):
+        places = [(k, j) for k, rungs in enumerate(row) for j in range(len(rungs))]
+        for (k, j), median, spread in zip(places, times[i].median, times[i].spread, strict=True):
+            effort = row[k][j].effort
+            steps[i, k, j], numbers["tolerance"][i, k, j] = effort
+            numbers["seconds"][i, k, j], numbers["spread"][i, k, j] = median, spread
+            if fixed_step(names[k]):
+                per_step[i, k] = median / effort.steps
+    told: dict[str, dict[str, Any]] = dataset.EFFORT_ATTRIBUTES | {
+        "seconds": {"long_name": "median wall time of a run", "units": "s"},
+        "spread": {"long_name": "half the range between the quartiles of the times over their median", "units": "1"},
+    }
+    variables: dict[str, Any] = {
+        name: (dataset.EFFORT_DIMENSIONS, values, told[name]) for name, values in (numbers | {"steps": steps}).items()
+    }
+    per = {"long_name": "wall time per step of a fixed step, from the longest run timed", "units": "s"}
+    return variables | {"seconds_per_step": (dataset.EFFORT_DIMENSIONS[:2], per_step, per)}

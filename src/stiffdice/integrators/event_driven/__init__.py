@@ -1,0 +1,1 @@
+"""The scheme that locates each change of contact and integrates between them."""

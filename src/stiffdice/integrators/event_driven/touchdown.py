@@ -1,0 +1,99 @@
+"""When a body in free flight touches the ground: the first time, to round-off.
+
+Node k is above the ground by c_k(t) = c + u t − g t²/2 + n·R(t) r_k, R(t) turning at a constant spin. A node that is c
+high and rises at c' now, under an acceleration of no more than A = g + Ω²ρ towards the ground, ρ its distance from the
+spin's axis, is not below c + c' s − A s²/2 after s; to go to that bound's zero, again and again, passes over no
+touch-down and converges as Newton's method does (conservative advancement).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import height_of, speed_of
+from stiffdice.dynamics.models import registry as models
+from stiffdice.dynamics.state import Physics
+
+# Enough for any touch-down; a node that grazes the ground so long is taken to touch it.
+_ADVANCES = 1000
+
+_ULPS = 4 * 2.0**-52
+
+# A node that a contact has let go may be below the ground by the round-off that `active_set.py` allows, and a little
+# more: were it taken to touch, neither flight nor contact would ever move it.
+_BELOW = 4
+
+
+@njit
+def _earliest(clearance: float, speed: float, pull: float) -> float:
+    """Return the time [s] after which c + c' s − pull s²/2 is zero, not negative; infinite if it never is."""
+    clearance = max(0.0, clearance)
+    if pull > 0.0:
+        root = math.sqrt(speed * speed + 2 * pull * clearance)
+        return (speed + root) / pull if speed > 0.0 else 2 * clearance / (root - speed) if root > speed else 0.0
+    return clearance / -speed if speed < 0.0 else math.inf
+
+
+@njit
+def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[float, int]:
+    """Return for how long [s], at most `most`, no node of a body in free flight goes below the ground; and advances.
+
+    At the time returned, if it is less, a node is at the ground but for round-off and about to go below; 0 if one is
+    below already.
+    """
+    pull = physics.gravity * physics.nz
+    height, speed = height_of(physics, state), speed_of(physics, state)
+    time = 0.0
+    if height > physics.reach:
+        time = _earliest(height - physics.reach, speed, pull)
+        if time >= most:
+            return most, 0
+    spin = state.angular_momentum
+    wx, wy, wz = spin[0] / physics.inertia, spin[1] / physics.inertia, spin[2] / physics.inertia
+    rate = math.sqrt(wx * wx + wy * wy + wz * wz) if models.turns(model) else 0.0
+    parts = _level_parts(physics, state, rate, wx, wy, wz)
+    place = state.position
+    length = abs(physics.nx * place[0]) + abs(physics.ny * place[1]) + abs(physics.nz * place[2])
+    small = _ULPS * (length + abs(speed) * time + physics.reach)
+    advances = 0
+    while advances < _ADVANCES:
+        advances += 1
+        centre = height + time * (speed - 0.5 * pull * time)
+        rising = speed - pull * time
+        cosine, sine = math.cos(rate * time), math.sin(rate * time)
+        pace, touches = math.inf, False
+        for k in range(parts.shape[0]):
+            clearance = centre + parts[k, 0] + cosine * parts[k, 1] + sine * parts[k, 2]
+            turning = rate * (cosine * parts[k, 2] - sine * parts[k, 1])
+            touches = touches or clearance < -_BELOW * small or (clearance <= small and rising + turning < 0.0)
+            hardest = pull + rate * rate * parts[k, 3]
+            pace = min(pace, _earliest(clearance, rising + turning, hardest))
+        if touches:
+            break
+        time += pace
+        if time >= most:
+            return most, advances
+    return time, advances
+
+
+@njit
+def _level_parts(physics: Physics, state: Any, rate: float, wx: float, wy: float, wz: float) -> Any:
+    """Return the nodes' levels [m] as constant, cosine and sine of the angle turned, and the latters' amplitude."""
+    nodes = state.node_offset
+    parts = np.zeros((nodes.shape[0], 4))
+    for k in range(nodes.shape[0]):
+        x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        level = physics.nx * x + physics.ny * y + physics.nz * z
+        if rate == 0.0:
+            parts[k, 0] = level
+            continue
+        ax, ay, az = wx / rate, wy / rate, wz / rate
+        on_axis = (ax * x + ay * y + az * z) * (physics.nx * ax + physics.ny * ay + physics.nz * az)
+        parts[k, 0], parts[k, 1] = on_axis, level - on_axis
+        parts[k, 2] = physics.nx * (ay * z - az * y) + physics.ny * (az * x - ax * z) + physics.nz * (ax * y - ay * x)
+        parts[k, 3] = math.hypot(parts[k, 1], parts[k, 2])
+    return parts

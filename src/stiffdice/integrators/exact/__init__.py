@@ -1,0 +1,1 @@
+"""The scheme that steps linear contact by its exact solution."""

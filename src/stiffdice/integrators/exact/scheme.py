@@ -1,0 +1,456 @@
+"""The exact motion of a cube that does not turn, piece by piece, in closed form.
+
+All nodes move with the centre, so that along the ground's normal the cube is a point on up to eight springs that begin
+at up to eight levels. Which of them press, and which nodes the `ungated` law drags, changes only where
+
+- a falling node meets the ground (touch), or the cube turns, falling or rising;
+- a rising node's force S d − D u falls to zero, at which it lets go, or rises above it again.
+
+Between two such events the cube is a damped oscillator, a body in drag, or in free flight (`oscillator.py`). Each is a
+zero of a function known in closed form, and so are the zeros of its derivative: between these it is monotone, and the
+first event is bracketed, never stepped over. Friction on level ground follows from the normal impulse
+(`regularised_friction.py`).
+
+Motion that repeats is taken at once: a cube that swings about its rest without leaving the ground loses the same share
+of its amplitude in every cycle, as the forces are then homogeneous in place and speed; without damping every bounce
+takes equally long. What is left of a swing below the round-off of the place is taken for rest.
+
+A step of any length is exact, to round-off and what the motion makes of that. Stored in a state, a place has an error
+of half a unit in the last place, which deep in a contact is as much as ω times that in the speed: few long steps are
+more precise than many short ones.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import height_of, reaches, speed_of
+from stiffdice.dynamics.state import TURNING, Array, Physics
+from stiffdice.integrators.adaptive_steps import PART
+from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, passing
+from stiffdice.integrators.exact.regularised_friction import along, evenly
+from stiffdice.scene.scene import Scene
+
+
+class Exact(NamedTuple):
+    """The tag of this scheme."""
+
+
+TAG = Exact()
+
+# One step of h, as files tell it.
+FORMULA = "parabolas and damped oscillations in closed form, from one event to the next"
+
+# The velocity is that at the stored place.
+LAG = 0.0
+
+# Nodes whose levels differ by less, in units of the farthest node's distance, are level: rounding differs by as much.
+_LEVEL = 2.0**-48
+
+# A cube that stands still, and is as near to touching the ground in units of its height, touches it.
+_LAID = 2.0**-51
+
+# A cube whose acceleration is as much less than the forces that cancel in it is at rest.
+_STILL = 2.0**-50
+
+# Cycles of a cube that slides are taken at once if that changes less of the way.
+_UNSEEN = 1e-15
+
+# Rows of the table of levels, lowest first: height above the lowest [m], how many nodes are on those below, and the sum
+# of their heights [m].
+_HEIGHT, _BELOW, _SUM = range(3)
+
+# What changes at the end of a piece.
+_NONE, _TOUCH, _PRESS, _RELEASE = range(4)
+
+
+class _Ground(NamedTuple):
+    """frequency √(S/m) and decay D/2m of one node [1/s]; drags: whether nodes in the air are damped; pull [m/s²].
+
+    by_place, by_speed: S and D over their sum, so that by_place·depth − by_speed·speed has the sign of a node's force.
+    lag: D/S [s]. levels: how many levels there are.
+    """
+
+    frequency: float
+    decay: float
+    drags: bool
+    pull: float
+    by_place: float
+    by_speed: float
+    lag: float
+    friction: float
+    cutoff: float
+    levels: int
+
+
+class _Course(NamedTuple):
+    """Where the cube is, how fast it is, and what is left to do.
+
+    c: clearance of the lowest level [m]. u: speed along the normal [m/s]. j: how many levels press. slip [m/s] and way
+    [m]: along the ground. left: of the time [s], and `lost` of that in rounding. lap: time since an undamped cube was
+    lowest [s], negative before it was. event: that the last piece ended with.
+    """
+
+    c: float
+    u: float
+    j: int
+    slip: float
+    way: float
+    left: float
+    lost: float
+    lap: float
+    event: int
+
+
+def unfit(scene: Scene, model: str) -> str | None:
+    """Return in one sentence why this scheme does not apply, or None if it does."""
+    if model in TURNING:
+        return (
+            f"scheme = exact, model = {model}: allowed is a model that does not turn the cube, such as sliding; "
+            "scheme = event computes this one"
+        )
+    ground = scene.ground
+    if ground.friction > 0 and scene.gravity > 0 and (ground.normal[0] != 0 or ground.normal[1] != 0):
+        normal = ", ".join(f"{part:g}" for part in ground.normal)
+        return (
+            f"scheme = exact, ground.friction = {ground.friction:g}, ground.normal = [{normal}]: allowed is friction "
+            "0, or level ground, [0, 0, 1], as gravity along the ground and friction together have no closed form; "
+            "scheme = event computes this scene"
+        )
+    return None
+
+
+@njit
+def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+    """Advance `state` by h [s], of any length, and return how many pieces that took.
+
+    The force is evaluated once for each piece; cycles taken at once are part of one. Not for a model that turns the
+    cube, nor for friction on a slope (`unfit`).
+    """
+    left, pieces = h, 0
+    while left > 0.0:
+        left, count, _ = part(model, law, physics, state, left, tolerance, PART)
+        pieces += count
+    return pieces
+
+
+@njit
+def part(
+    model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
+) -> tuple[float, int, int]:
+    """Advance `state` by h [s], or by less in as many pieces as are allowed; return what is left [s], pieces, and work.
+
+    most: pieces at most.
+    """
+    fall = physics.weight / physics.mass
+    pull = fall * physics.nz
+    height, u = height_of(physics, state), speed_of(physics, state)
+    drags = physics.damping > 0.0 and reaches(law, 1.0)
+    if not drags and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
+        _fly(state, fall, h)
+        return 0.0, 1, 1
+    tx = state.velocity[0] - u * physics.nx
+    ty = state.velocity[1] - u * physics.ny
+    tz = state.velocity[2] - u * physics.nz
+    slip = math.hypot(math.hypot(tx, ty), tz) if physics.friction > 0.0 else 0.0
+    table = np.empty((3, 9))
+    levels, lowest = _levels(physics, state, table)
+    before = height + lowest
+    # Laid on the ground, to round-off of the place.
+    start = 0.0 if u == 0.0 and abs(before) <= _LAID * (abs(height) + physics.reach) else before
+    end, pieces = _advance(_ground_of(physics, drags, pull, levels), table, start, u, slip, h, most)
+    c, u, h = end.c, end.u, h - max(0.0, end.left)
+    share, time = (end.slip / slip, end.way / slip) if slip > 0.0 else (1.0, h)
+    # Gravity along the ground: none where there is friction.
+    sx, sy, sz = pull * physics.nx, pull * physics.ny, pull * physics.nz - fall
+    state.position[0] += (time * tx + h * (h * sx / 2)) + (c - before) * physics.nx
+    state.position[1] += (time * ty + h * (h * sy / 2)) + (c - before) * physics.ny
+    state.position[2] += (time * tz + h * (h * sz / 2)) + (c - before) * physics.nz
+    if pieces > 1:
+        # Near the ground the clearance is known to more digits than where it was before.
+        gap = c - (height_of(physics, state) + lowest)
+        state.position[0] += gap * physics.nx
+        state.position[1] += gap * physics.ny
+        state.position[2] += gap * physics.nz
+    state.velocity[0] = (share * tx + h * sx) + u * physics.nx
+    state.velocity[1] = (share * ty + h * sy) + u * physics.ny
+    state.velocity[2] = (share * tz + h * sz) + u * physics.nz
+    return end.left if math.isfinite(end.c) else 0.0, pieces, pieces
+
+
+@njit
+def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
+    """Take so many steps of free flight, on the parabola."""
+    _fly(state, physics.weight / physics.mass, steps * h)
+
+
+@njit
+def swing(
+    place: float, speed: float, h: float, steps: int, square: float, rate: float, constant: float
+) -> tuple[float, float]:
+    """Return not-a-number, "not known": a single step goes as far."""
+    return math.nan, math.nan
+
+
+@njit
+def _fly(state: Any, fall: float, time: float) -> None:
+    state.position[0] += time * state.velocity[0]
+    state.position[1] += time * state.velocity[1]
+    state.position[2] += time * (state.velocity[2] - fall * (time / 2))
+    state.velocity[2] -= fall * time
+
+
+@njit
+def _levels(physics: Physics, state: Any, table: Array) -> tuple[int, float]:
+    """Fill the table of levels; return how many there are, and the lowest's height above the centre [m]."""
+    heights = table[_HEIGHT]
+    nodes = state.node_offset
+    for k in range(nodes.shape[0]):
+        height = physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2]
+        place = k
+        while place > 0 and heights[place - 1] > height:
+            heights[place] = heights[place - 1]
+            place -= 1
+        heights[place] = height
+    table[_BELOW, 0] = table[_SUM, 0] = 0.0
+    levels, start, lowest = 0, 0, 0.0
+    for k in range(1, nodes.shape[0] + 1):
+        if k < nodes.shape[0] and heights[k] - heights[k - 1] <= _LEVEL * physics.reach:
+            continue
+        mean = 0.0
+        for member in range(start, k):
+            mean += (heights[member] - heights[start]) / (k - start)
+        mean += heights[start]
+        if levels == 0:
+            lowest = mean
+        heights[levels] = mean - lowest
+        table[_BELOW, levels + 1] = k
+        table[_SUM, levels + 1] = table[_SUM, levels] + (k - start) * (mean - lowest)
+        levels += 1
+        start = k
+    return levels, lowest
+
+
+@njit
+def _ground_of(physics: Physics, drags: bool, pull: float, levels: int) -> _Ground:
+    stiffness, damping = physics.stiffness, physics.damping
+    both = stiffness + damping
+    return _Ground(
+        math.sqrt(stiffness) / math.sqrt(physics.mass),
+        damping / physics.mass / 2,
+        drags,
+        pull,
+        stiffness / both if both > 0.0 else 1.0,
+        damping / both if both > 0.0 else 0.0,
+        damping / stiffness if stiffness > 0.0 else 0.0,
+        physics.friction,
+        physics.cutoff,
+        levels,
+    )
+
+
+@njit
+def _pressing(ground: _Ground, table: Array, c: float, u: float) -> int:
+    """Return how many levels, from the lowest on, press on the ground."""
+    j = 0
+    if u < 0.0:
+        while j < ground.levels and c + table[_HEIGHT, j] <= 0.0:
+            j += 1
+    else:
+        while j < ground.levels and ground.by_place * (c + table[_HEIGHT, j]) + ground.by_speed * u < 0.0:
+            j += 1
+    return j
+
+
+@njit
+def _advance(
+    ground: _Ground, table: Array, c: float, u: float, slip: float, h: float, most: int
+) -> tuple[_Course, int]:
+    """Go on for h [s], or so many pieces, from a clearance c [m] of the lowest level and a speed u [m/s] upwards.
+
+    slip [m/s]: along the ground; zero where there is no friction. Return where that ends, and pieces.
+    """
+    now = _Course(c, u, _pressing(ground, table, c, u), slip, 0.0, h, 0.0, -1.0, _NONE)
+    pieces = 0
+    while now.left > 0.0 and pieces < most:
+        pieces += 1
+        if now.u == 0.0:
+            now = _wait(ground, table, now)
+        free = now.j == 0 and now.c >= 0.0 and not ground.drags
+        t = _landing(ground.pull, now.c, now.u) if free else math.inf
+        if t < now.left:
+            now = _land(ground, now, t)
+        elif now.left > 0.0:
+            now = _move(ground, table, now)
+    return now, pieces
+
+
+@njit
+def _springs(ground: _Ground, table: Array, j: int, c: float) -> float:
+    """Return the acceleration by the springs of the lowest j levels [m/s²]."""
+    return -ground.frequency * ground.frequency * (table[_BELOW, j] * c + table[_SUM, j])
+
+
+@njit
+def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
+    """Take what is known ahead of a cube that stands still for a moment: rest, swings about it, or whole bounces."""
+    omega = math.sqrt(table[_BELOW, now.j]) * ground.frequency
+    springs = _springs(ground, table, now.j, now.c)
+    push = springs - ground.pull
+    if abs(push) <= _STILL * (abs(ground.pull) + omega * omega * abs(now.c)):
+        slip, slipped = evenly(now.slip, ground.cutoff, ground.friction * springs, now.left)
+        return _Course(now.c, 0.0, now.j, slip, now.way + slipped, 0.0, 0.0, now.lap, _NONE)
+    cycles, period, decay = _cycles(ground, table, now.j, now.c, push, now.slip, now.left)
+    if cycles > 0.0:
+        moved = -push / omega / omega * math.expm1(-cycles * decay)
+        slip, slipped = evenly(now.slip, ground.cutoff, ground.friction * ground.pull, cycles * period)
+        way = now.way + slipped - (ground.friction * moved if slip > 0.0 else 0.0)
+        left = now.left - cycles * period
+        left = now.left % period if left < period else left  # without rounding, where these are all that fit
+        return _Course(now.c + moved, 0.0, now.j, slip, way, left, 0.0, now.lap, _NONE)
+    if not (push > 0.0 and ground.decay == 0.0 and now.slip == 0.0):
+        return now
+    left, lost = (now.left % now.lap, 0.0) if now.lap > 0.0 else (now.left, now.lost)
+    return _Course(now.c, 0.0, now.j, 0.0, now.way, left, lost, 0.0, _NONE)
+
+
+@njit
+def _land(ground: _Ground, now: _Course, t: float) -> _Course:
+    """Fly on to the ground, which the cube meets after t [s]."""
+    u = -math.sqrt(max(0.0, now.u * now.u + 2 * ground.pull * now.c))
+    left, lost = _later(now, t)
+    return _Course(0.0, u, 1, now.slip, now.way + now.slip * t, left, lost, _lap(now, t), _TOUCH)
+
+
+@njit
+def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
+    """Go on to the next event."""
+    nodes, push = table[_BELOW, now.j], _springs(ground, table, now.j, now.c) - ground.pull
+    falls = now.u < 0.0 or (now.u == 0.0 and push < 0.0)
+    beta = ground.decay * (table[_BELOW, ground.levels] if ground.drags and falls else nodes)
+    motion = Oscillator(math.sqrt(nodes) * ground.frequency, beta, push, now.u)
+    turn = first_zero(motion.omega, beta, now.u, push - 2 * beta * now.u)
+    if falls:
+        t, event = _sink(table, motion, now.j, ground.levels, now.c, min(turn, now.left))
+    else:
+        t, event = _rise(ground, table, motion, now.j, now.c, min(turn, now.left), now.event == _PRESS)
+    moved, u = after(motion, t)
+    slip, slipped = along(motion, ground.pull, ground.friction, now.slip, ground.cutoff, t)
+    c, j = now.c + moved, now.j
+    if event == _NONE:
+        u = 0.0 if t == turn else u
+    else:
+        j += -1 if event == _RELEASE else 1
+        # To the last digit, where the place alone decides.
+        if t > 0.0 and (event == _TOUCH or ground.decay == 0.0):
+            c = -table[_HEIGHT, min(j, now.j)]
+    left, lost = _later(now, t)
+    return _Course(c, u, j, slip, now.way + slipped, left, lost, _lap(now, t), event)
+
+
+@njit
+def _later(now: _Course, t: float) -> tuple[float, float]:
+    """Return what is left of the time after t [s], and what rounding has lost of it so far (Kahan's sum)."""
+    spent = t + now.lost
+    left = now.left - spent
+    return left, (left - now.left) + spent
+
+
+@njit
+def _lap(now: _Course, t: float) -> float:
+    return now.lap + t if now.lap >= 0.0 else now.lap
+
+
+@njit
+def _landing(pull: Any, c: float, u: float) -> float:
+    """Return when [s] a body in free flight at a clearance c [m] and a speed u [m/s] meets the ground."""
+    square = u * u + 2 * pull * c
+    if u < 0.0:
+        return 2 * c / (math.sqrt(square) - u) if square >= 0.0 else math.inf
+    return (u + math.sqrt(square)) / pull if pull > 0.0 else math.inf
+
+
+@njit
+def _sink(table: Array, motion: Any, j: int, levels: int, c: float, end: float) -> tuple[float, int]:
+    """Return when [s] the first event of a falling cube is, at `end` at the latest, and which."""
+    if j < levels:
+        gap = c + table[_HEIGHT, j]
+        pace = motion.push - 2 * motion.beta * motion.speed
+        t = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, end, _landing(-pace, max(0.0, gap), motion.speed))
+        if t <= end:
+            return t, _TOUCH
+    return end, _NONE
+
+
+@njit
+def _rise(ground: _Ground, table: Array, motion: Any, j: int, c: float, end: float, pressed: bool) -> tuple[float, int]:
+    """Return the same for a rising cube.
+
+    A level at a height a presses while x = by_place·(c + a) + by_speed·u is negative. As x' is zero once at most before
+    the cube turns, x goes one way until then, and the other way from there. A level that has just pressed does not let
+    go at once: deep in a strong damping both forces are large, and which is larger is lost in round-off.
+    """
+    pace = motion.push - 2 * motion.beta * motion.speed
+    value = ground.by_place * motion.speed + ground.by_speed * pace
+    # In an order that leaves the range of doubles last.
+    slope = ground.by_place * pace - 2 * motion.beta * (ground.by_speed * pace)
+    slope -= ground.by_speed * motion.omega * (motion.omega * motion.speed)
+    climbs = value > 0.0 or (value == 0.0 and slope > 0.0)
+    low, high = 0.0, min(end, first_zero(motion.omega, motion.beta, value, slope))
+    for _ in range(2):
+        level = j - 1 if climbs else j
+        if low < high and 0 <= level < ground.levels:
+            gap = ground.by_place * (c + table[_HEIGHT, level])
+            t = passing(motion, ground.by_place, ground.by_speed, gap, 1.0 if climbs else -1.0, low, high, math.nan)
+            if t <= high and not (climbs and pressed and t == 0.0):
+                return t, _RELEASE if climbs else _PRESS
+        climbs = not climbs
+        low, high = high, end
+    return end, _NONE
+
+
+@njit
+def _cycles(
+    ground: _Ground, table: Array, j: int, c: float, push: float, slip: float, left: float
+) -> tuple[float, float, float]:
+    """Return how many cycles, how long [s] each, and by which power of e [1] the amplitude shrinks in each.
+
+    Of a cube that stands still for a moment and will never again change how many levels press: zero where it may. A
+    cycle falls at one damping and rises at another, for half a period each.
+
+    Friction slows a sliding cube on average as its weight does. In the slip's z of `regularised_friction.py` as a
+    function of the loss, expanded about the average, the swing of size y changes the way by less than 5 μ y
+    cutoff/(slip + cutoff), as long as the slip is large against the speed of the swing; its part without the cutoff has
+    a closed form.
+    """
+    nodes = table[_BELOW, j]
+    if not nodes * ground.frequency > 0.0:
+        return 0.0, 0.0, 0.0
+    omega = math.sqrt(nodes) * ground.frequency
+    rising = ground.decay * nodes
+    falling = ground.decay * (table[_BELOW, ground.levels] if ground.drags else nodes)
+    if not falling < omega:
+        return 0.0, 0.0, 0.0
+    size, rest = abs(push) / omega / omega, c + push / omega / omega
+    highest = ground.by_place * (rest + size + table[_HEIGHT, j - 1]) + ground.by_speed * omega * size
+    if not highest <= _STILL * ground.by_place * size or (
+        j < ground.levels and not rest - size + table[_HEIGHT, j] > 0.0
+    ):
+        return 0.0, 0.0, 0.0
+    up = math.sqrt(omega - rising) * math.sqrt(omega + rising)
+    down = math.sqrt(omega - falling) * math.sqrt(omega + falling)
+    period = math.pi / up + math.pi / down
+    cycles = np.floor(left / period)
+    if slip > 0.0:
+        slowest = max(0.0, 1000 * ground.friction * omega * size - ground.cutoff)
+        stops = (slip - slowest) / (ground.friction * ground.pull)
+        if slowest > 0.0:
+            cycles = min(cycles, np.floor(stops / period))
+        unseen = 5 * ground.friction * size * ground.cutoff / (slowest + ground.cutoff)
+        if not unseen <= _UNSEEN * min(cycles * period, stops) * slip / 2:
+            return 0.0, 0.0, 0.0
+    return cycles, period, math.pi * (rising / up + falling / down)

@@ -1,0 +1,43 @@
+"""Forward Euler: the paper's equations 6 to 9 read literally, all at once with the old velocity and the old spin.
+
+First order. An undamped oscillator grows by √(1 + (ωh)²) a step, at any step; it takes a damping ratio ζ > ωh/2 to
+hold it (Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, I.7; II, IV.2). The listings use the new
+velocity in equation 7, which makes all the difference: `symplectic_euler`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.models import registry as models
+from stiffdice.dynamics.state import Physics
+from stiffdice.integrators import free_flight
+
+
+class ForwardEuler(NamedTuple):
+    """The tag of this scheme."""
+
+
+TAG = ForwardEuler()
+
+# One step of h, as files tell it.
+FORMULA = "x += h u; nodes turned by h L/I; then u += h a; L += h torque, all of the old state"
+
+# The velocity of a step is the path's slope half a step after it: x_(n+1) = x_n + h u_n.
+LAG = -0.5
+
+
+@njit
+def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+    """Advance `state` by one step of h [s] and return how often the force was evaluated."""
+    wrench = models.force(model, law, physics, state)
+    models.drift(model, physics, state, h)
+    models.kick(model, physics, state, wrench, h)
+    return 1
+
+
+@njit
+def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
+    """Take so many steps of free flight: u_n = u_0 + n h a, x_n = x_0 + n h u_0 + h² a n(n − 1)/2."""
+    free_flight.flight(model, physics, state, h, steps, LAG)

@@ -1,0 +1,153 @@
+"""Up to which ωh a scheme of fixed steps is linearly stable on a damped contact, a scene's fastest contact, and the
+steps that resolve both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array
+from stiffdice.scene.scene import Scene
+
+# Limits are looked for up to this ωh, in so many parts of it; all of explicit schemes are below three.
+_LONGEST, _LOOKS = 3.0, 3000
+
+# What round-off may add to an eigenvalue of modulus one.
+_ROUND_OFF = 1e-12
+
+
+# A damping ratio at which springs no longer matter to how fast a motion decays.
+_OVERDAMPED = 1e6
+
+
+class Hardest(NamedTuple):
+    """The fastest contact of a scene: its ω [rad/s], its damping ratio ζ [1], and what moves in it."""
+
+    omega: float
+    zeta: float
+    mode: str
+
+
+def hardest(scene: Scene, model: str) -> Hardest:
+    """Return the fastest contact mode of a cube on a face, which no edge or corner exceeds.
+
+    It is the bounce, ω² = 4S/m, for a model that does not turn the cube; rocking, 6S/m for a `solid` cube, where that
+    is faster. ζ = (D/S) ω/2, as dashpots stand beside the springs. All zero where nothing touches.
+    """
+    stiffness, damping = scene.ground.stiffness, scene.ground.damping
+    if model not in TOUCHING or stiffness == 0:
+        return Hardest(0.0, 0.0, "none")
+    nodes = _nodes_of_mode(scene, model, falling=False)
+    mode = f"bounce, ω² = {nodes:g} S/m" if nodes == linear_theory.BOUNCE_NODES else f"rocking, ω² = {nodes:.3g} S/m"
+    omega = linear_theory.contact_frequency(stiffness, scene.cube.mass, nodes)
+    return Hardest(omega, damping / stiffness * omega / 2, mode)
+
+
+def _nodes_of_mode(scene: Scene, model: str, *, falling: bool) -> float:
+    """Return k of the fastest mode's ω² = k S/m and damping k D/m: of a cube on a face, or of one damped in mid-air."""
+    nodes = 2 * linear_theory.BOUNCE_NODES if falling else linear_theory.BOUNCE_NODES
+    if model not in TURNING:
+        return nodes
+    offsets = scene.cube.node_offsets()
+    upright = scene.with_ground(normal=(0.0, 0.0, 1.0), stiffness=1.0)
+    modes = linear_theory.contact_modes(upright, offsets, np.ones(len(offsets), bool) if falling else offsets[:, 2] < 0)
+    turning = float(modes[-1]) * scene.cube.mass
+    return turning if turning > nodes * (1 + _ROUND_OFF) else nodes
+
+
+class Fewest(NamedTuple):
+    """The fewest steps [1], not rounded, that keep a run within the linear limit of its scheme; 0 where there is none.
+
+    contact: of the fastest contact mode (`hardest`). drag: of a falling cube's damping under the ungated law.
+    """
+
+    contact: float
+    drag: float
+
+
+@lru_cache(maxsize=64)  # the cells of a column share them
+def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
+    """Return the steps below which a force that a run may meet is beyond the linear limit of its scheme."""
+    if model not in TOUCHING:
+        return Fewest(0.0, 0.0)
+    mass, ground = scene.cube.mass, scene.ground
+    with np.errstate(all="ignore"):  # numbers of a scene may be anything
+        decay = scene.duration / np.float64(_longest_decay(scheme))
+        omega, zeta, _ = hardest(scene, model)
+        if omega > 0 and zeta < _OVERDAMPED:
+            contact = np.float64(omega) * scene.duration / stability_limit(scheme, zeta)
+        else:
+            contact = _nodes_of_mode(scene, model, falling=False) * ground.damping / np.float64(mass) * decay
+        drag = _nodes_of_mode(scene, model, falling=True) * ground.damping / np.float64(mass) * decay
+    return Fewest(float(contact), float(drag) if ground.contact == "ungated" else 0.0)
+
+
+def _longest_decay(scheme: str) -> float:
+    """Return the rate times step size [1] up to which a scheme damps a speed that decays by itself."""
+    return 2 * _OVERDAMPED * stability_limit(scheme, _OVERDAMPED)
+
+
+def half_turn_steps(scene: Scene, momentum: Array) -> Array:
+    """Return the fewest steps [1] at which a cube turns by at most half a turn in a step, shape (...).
+
+    momentum: angular momenta [kg m²/s], shape (..., 3).
+    """
+    with np.errstate(all="ignore"):
+        rate = np.hypot(np.hypot(momentum[..., 0], momentum[..., 1]), momentum[..., 2]) / scene.cube.moment_of_inertia
+        return np.asarray(scene.duration * rate / math.pi)
+
+
+def stability_limit(scheme: str, zeta: float) -> float:
+    """Return the ωh [1] up to which every step of a scheme shrinks or keeps x'' = −ω²x − 2ζω x'.
+
+    Infinite for a scheme without a limit, 0 for one that is never stable. By the formula of `linear_theory` for
+    symplectic Euler, for forward Euler as |1 + hλ| <= 1 asks with both λ = ω(−ζ ± √(ζ² − 1)), for the others by the
+    spectral radius of a step's linear map.
+    """
+    if scheme == "symplectic_euler":
+        return linear_theory.stability_limit(zeta)
+    if scheme == "forward_euler":
+        return 2 * zeta if zeta <= 1 else 2 / (zeta + math.sqrt(zeta - 1) * math.sqrt(zeta + 1))
+    step = _STEPS.get(scheme)
+    if step is None:
+        return math.inf
+    # A strongly damped contact is faster than its ω by 2ζ.
+    longest = _LONGEST / (1 + zeta)
+    stable, unstable = 0.0, longest / _LOOKS
+    while _radius(step, unstable, zeta) <= 1 + _ROUND_OFF:
+        stable, unstable = unstable, unstable + longest / _LOOKS
+    while stable < (middle := (stable + unstable) / 2) < unstable:
+        stable, unstable = (middle, unstable) if _radius(step, middle, zeta) <= 1 + _ROUND_OFF else (stable, middle)
+    return stable
+
+
+Step = Callable[[float, float, float, float], tuple[float, float]]
+
+
+def _radius(step: Step, h: float, zeta: float) -> float:
+    columns = [step(1.0, 0.0, h, zeta), step(0.0, 1.0, h, zeta)]
+    return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
+
+
+def _velocity_verlet(x: float, v: float, h: float, zeta: float) -> tuple[float, float]:
+    old = -x - 2 * zeta * v
+    x, v = x + h * (v + h / 2 * old), v + h * old
+    return x, v + h / 2 * (-x - 2 * zeta * v - old)
+
+
+def _rk4(x: float, v: float, h: float, zeta: float) -> tuple[float, float]:
+    there, sum_x, sum_v = (x, v), x, v
+    # Of a linear motion it is the exponential series up to h⁴.
+    for power in range(1, 5):
+        there = h / power * there[1], -h / power * (there[0] + 2 * zeta * there[1])
+        sum_x, sum_v = sum_x + there[0], sum_v + there[1]
+    return sum_x, sum_v
+
+
+_STEPS: dict[str, Step] = {"velocity_verlet": _velocity_verlet, "rk4": _rk4}

@@ -1,0 +1,149 @@
+"""Files in: whole, of a format this code knows, and with nothing in them that points outside."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from stiffdice.errors import InputError, RefusedError
+from stiffdice.io import isolation
+from stiffdice.io.cf_enums import labelled
+from stiffdice.io.checked_file import check_values, opened, told
+from stiffdice.io.structure_check import Contents
+
+# Of a file of runs about so many are in memory at a time; a run takes some 130 bytes.
+RUNS_AT_ONCE = 1 << 14
+
+
+def open_file(path: str | Path) -> xr.Dataset:
+    """Return the dataset in a file of ours, loaded; raises InputError, naming the file, if it cannot be trusted.
+
+    What is not ours is refused before a value is read (`io.structure_check`), damage by its seal. A file from elsewhere
+    is to be tried in another process before (`io.isolation`).
+    """
+    with told(path), opened(path) as (file, contents):
+        size, memory = sum(contents.sizes.values()), _memory()
+        if size > memory:
+            raise InputError(f"holds {size / 1e9:.3g} GB: this machine has {memory / 1e9:.3g} GB of memory")
+        return _dataset(contents, {name: _values(file, contents, name) for name in contents.sizes})
+
+
+def open_results(path: str | PathLike[str]) -> xr.Dataset:
+    """Return the dataset in a file of stiffdice, loaded, with enums as words: `sel(contact="gated")`, `sel(axis="z")`.
+
+    path: of a file of any kind (docs/FORMAT.md says dimensions and units). `xarray.open_dataset` opens the same file
+    with the enums as the numbers that are stored.
+
+    Raises InputError, naming the file, if it cannot be read or trusted (docs/trust.md).
+    """
+    name = str(path)
+    isolation.admit(name)
+    return labelled(open_file(name))
+
+
+def parts(path: str | Path, cells: int | None = None) -> Iterator[xr.Dataset]:
+    """Yield a file of runs part by part, so many cells at a time, loaded; raises InputError as `open_file` does.
+
+    By default so many cells that a part holds about RUNS_AT_ONCE runs: what is in memory does not grow with the file,
+    and what a part costs by itself is little beside its runs.
+    """
+    with ExitStack() as stack:
+        with told(path):
+            file, contents = stack.enter_context(opened(path))
+            sizes = _sizes(file, contents)
+            if "cell" not in sizes:
+                raise RefusedError(f"{path}: has no dimension cell; not a file of runs")
+            others = {
+                name: _values(file, contents, name)
+                for name, dimensions in contents.dimensions.items()
+                if "cell" not in dimensions
+            }
+        count = cells or _cells_at_once(file, contents, sizes.get("member", 1))
+        for first in range(0, sizes["cell"], count):
+            with told(path):
+                some = {
+                    name: others[name] if name in others else _values(file, contents, name, first, first + count)
+                    for name in contents.dimensions
+                }
+                part = _dataset(contents, some)
+            yield part
+
+
+def head(path: str | Path, names: Sequence[str]) -> tuple[Mapping[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Return the attributes of a file of ours, and some of its variables; raises InputError as `open_file` does."""
+    with told(path), opened(path) as (file, contents):
+        return contents.attributes[""], {name: _values(file, contents, name) for name in names}
+
+
+def some(path: str | Path, cells: Sequence[int], members: slice) -> dict[str, npt.NDArray[Any]]:
+    """Return some members in some cells of a file of runs, loaded, by name, what has cells as its first dimension.
+
+    Cells are ascending; those between them are read, too. Raises InputError as `open_file` does.
+    """
+    first = cells[0]
+    rows = [cell - first for cell in cells]
+    with told(path), opened(path) as (file, contents):
+        return {
+            name: _values(file, contents, name, first, cells[-1] + 1)[rows, members]
+            for name, dimensions in contents.dimensions.items()
+            if dimensions[:2] == ("cell", "member")
+        }
+
+
+def _cells_at_once(file: h5py.File, contents: Contents, members: int) -> int:
+    """Return how many cells to read at a time: whole chunks, so that none is unpacked twice."""
+    chunks = (
+        file[name].chunks[dimensions.index("cell")]
+        for name, dimensions in contents.dimensions.items()
+        if {"cell", "member"} <= set(dimensions) and file[name].chunks
+    )
+    together = max(chunks, default=1)
+    return together * max(1, RUNS_AT_ONCE // (together * max(1, members)))
+
+
+def _memory() -> float:
+    """Return how many bytes of memory this machine has; no bound where it does not say."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return math.inf
+
+
+def _sizes(file: h5py.File, contents: Contents) -> dict[str, int]:
+    return {
+        dimension: size
+        for name, dimensions in contents.dimensions.items()
+        for dimension, size in zip(dimensions, file[name].shape, strict=True)
+    }
+
+
+def _values(file: h5py.File, contents: Contents, name: str, first: int = 0, end: int | None = None) -> np.ndarray:
+    """Return a variable's values, of some cells if it has cells; raises RefusedError at what no file of ours holds."""
+    cells = slice(first, end)
+    place = tuple(cells if dimension == "cell" else slice(None) for dimension in contents.dimensions[name])
+    found = np.asarray(file[name][place])
+    found = found.astype(found.dtype.newbyteorder("="), copy=False)
+    check_values(contents, name, found)
+    return found
+
+
+def _dataset(contents: Contents, found: dict[str, np.ndarray]) -> xr.Dataset:
+    """Return checked values as what their file says they are."""
+    variables = {
+        name: xr.Variable(contents.dimensions[name], array, contents.attributes[name]) for name, array in found.items()
+    }
+    return xr.Dataset(
+        {name: variable for name, variable in variables.items() if name not in contents.coordinates},
+        {name: variable for name, variable in variables.items() if name in contents.coordinates},
+        contents.attributes[""],
+    )

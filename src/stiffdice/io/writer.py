@@ -1,0 +1,137 @@
+"""Files that are whole or not there: made in memory, written under a temporary name, fsynced, renamed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from stiffdice.errors import OutputError
+from stiffdice.io import host, seal
+
+
+def check_target(path: str | Path) -> Path:
+    """Return `path` if a file can be written there; raises OutputError before any work is done otherwise."""
+    target = Path(path)
+    if target.exists() and not target.is_file():
+        raise OutputError(f"{target}: is {'a folder; name a file in it' if target.is_dir() else 'not a regular file'}")
+    if not target.parent.is_dir():
+        raise OutputError(f"{target}: the folder {target.parent} does not exist")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        raise OutputError(f"{target}: the folder {target.parent} is not writable")
+    return target
+
+
+def temporary_of(target: Path) -> Path:
+    """Return the name under which this process writes a file before it is whole: `.NAME.HOST.PID.part`, beside it.
+
+    Removes what processes of this host that are gone left of the same file; those of other hosts, and of other
+    containers of this one, cannot be asked.
+    """
+    here = host.name()
+    ours = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(here)}\.([0-9]+)\.part")
+    with contextlib.suppress(OSError):  # a folder that cannot be read is told by who writes in it
+        for entry in os.scandir(target.parent):
+            found = ours.fullmatch(entry.name)
+            if found and not _is_alive(int(found[1])):
+                with contextlib.suppress(OSError):
+                    Path(entry).unlink()
+    return target.with_name(f".{target.name}.{here}.{os.getpid()}.part")
+
+
+def clear(target: Path) -> None:
+    """Remove all that is unfinished of a file, of whatever host: for one who knows that nobody else writes it."""
+    name = re.compile(rf"\.{re.escape(target.name)}\..+\.[0-9]+\.part")
+    with contextlib.suppress(OSError):
+        for entry in os.scandir(target.parent):
+            if name.fullmatch(entry.name):
+                with contextlib.suppress(OSError):
+                    Path(entry).unlink()
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # another user's
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def whole(target: Path) -> Iterator[Path]:
+    """Give the path under which the block writes a file, which has its name once the block ends.
+
+    Raises OutputError, and leaves what was there before, if it cannot be stored.
+    """
+    temporary = temporary_of(target)
+    try:
+        yield temporary
+        store(temporary, target)
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:
+    """Store `data`, and `end` after it, under `path`; raises OutputError, and leaves what was there, if it cannot."""
+    with whole(Path(path)) as temporary, temporary.open("wb") as file:
+        file.write(data)
+        file.write(end)
+
+
+def store(temporary: Path, target: Path) -> None:
+    """Give a finished file its name, once it is safely on disk; raises OutputError if it cannot."""
+    try:
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(target)
+    except OSError as error:
+        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+    with contextlib.suppress(OSError):  # the file is there; some file systems cannot sync a folder
+        _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a rename last through a power failure."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
+    """Store a dataset as netCDF-4 on HDF5.
+
+    dataset: as `run_dataset` returns it. path: of the file, which is replaced as a whole or left as it was. The file is
+    compressed (gzip, shuffle), has a checksum on every chunk (fletcher32) and is sealed. Equal datasets give equal
+    bytes.
+
+    Raises OutputError if it cannot be stored.
+    """
+    try:
+        image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset)))
+    except OSError as error:  # in memory, but what makes it may have to be loaded first
+        raise OutputError(f"{path}: {error.strerror or error}; nothing was stored") from None
+    write_bytes(image, path, seal.line_of(image))
+
+
+def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, object]]:
+    encoding: dict[str, dict[str, object]] = {}
+    for name, variable in dataset.variables.items():
+        encoding[str(name)] = {}
+        # Missing values are NaN here; a _FillValue would say so twice, and coordinates must have none.
+        if np.issubdtype(variable.dtype, np.floating):
+            encoding[str(name)]["_FillValue"] = None
+        if variable.size > 1:
+            encoding[str(name)] |= {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
+    return encoding

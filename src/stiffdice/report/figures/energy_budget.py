@@ -1,0 +1,85 @@
+"""Where the energy of each bounce goes, at a few numbers of steps: damping, friction, and what the scheme makes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report.figures import style
+
+# By what is booked: a look, and words. Gains are marks that point up, losses marks that point down.
+_LOOKS: dict[str, tuple[str, str]] = {
+    "friction_work": (style.QUIET, "friction"),
+    "damping_work": (style.BLUE, "damping (and drag during the bounce)"),
+    "scheme_work": (style.VERMILION, "the scheme itself"),
+}
+
+SMALLEST = 1e-5  # [J]; less than a millionth of what the cube has
+
+
+def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the works of the first bounces on a logarithmic scale, a panel for each contact law.
+
+    experiments: one, as `experiments.ledger.measure` makes it.
+    """
+    (books,) = experiments.values()
+    laws = meanings_of(books.contact)
+    figure = style.new_figure(title, width=9.0, height=1.6 + 2.7 * len(laws))
+    panels = figure.subplots(len(laws), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for k, (panel, law) in enumerate(zip(panels, laws, strict=True)):
+        _panel(panel, books.isel(contact=k))
+        panel.set_title(style.LAW_NAMES[law])
+        panel.set_ylabel("work in one bounce [J]")
+    labels = [
+        f"{int(steps):,}\nωh = {float(omega_h):.3g}" for steps, omega_h in zip(books.steps, books.omega_h, strict=True)
+    ]
+    panels[-1].set_xticks(range(len(labels)), labels)
+    top = np.nanmax([np.abs(books[name].values) for name in ("friction_work", "damping_work", "scheme_work")])
+    panels[0].set_ylim(SMALLEST, 3 * top)
+    panels[-1].set_xlim(-0.5, len(labels) - 0.5)
+    panels[-1].set_xlabel(
+        "number of time steps [1], and ωh; in each group the first bounces from left to right; "
+        f"below {SMALLEST:g} J not shown"
+    )
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _panel(panel: Any, books: xr.Dataset) -> None:
+    panel.set_yscale("log")
+    count = books.sizes["bounce"]
+    offsets = (np.arange(count) - (count - 1) / 2) * 0.7 / count
+    works = {
+        "friction_work": books.friction_work.values,
+        "damping_work": books.damping_work.values + books.drag_work.values,
+        "scheme_work": books.scheme_work.values,
+    }
+    for name, values in works.items():
+        color = _LOOKS[name][0]
+        for gain, marker in ((True, "^"), (False, "v")):
+            group, bounce = np.nonzero(values > 0 if gain else values < 0)
+            panel.plot(
+                group + offsets[bounce],
+                np.abs(values[group, bounce]),
+                marker,
+                color=color,
+                markerfacecolor=color if gain else "none",
+                markersize=5,
+            )
+    for edge in range(1, books.sizes["steps"]):
+        panel.axvline(edge - 0.5, color=style.FAINT, linewidth=0.8)
+    panel.grid(axis="x", visible=False)
+
+
+def _legend() -> list[Any]:
+    handles = [Line2D([], [], marker="s", linestyle="none", color=color, label=text) for color, text in _LOOKS.values()]
+    common: Any = {"linestyle": "none", "color": style.INK}
+    handles.append(Line2D([], [], marker="^", label="full, up: energy gained", **common))
+    handles.append(Line2D([], [], marker="v", markerfacecolor="none", label="open, down: energy lost", **common))
+    return handles

@@ -1,0 +1,92 @@
+"""What one flat bounce becomes with longer and longer steps: a panel for each method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, NullFormatter
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.experiments.engines.single_bounce import OUTCOMES
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report.figures import effort_ladder, style
+from stiffdice.report.tables import engine_notes
+from stiffdice.report.tables.engines import OFF, limit_of, within
+
+_COLUMNS = 3
+# Restitutions above are told by an arrow.
+_HIGHEST = 3.2
+
+
+def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return restitution, from the least to the most over the phases, against ωh; a panel for each method.
+
+    experiments: one, as `experiments.engine_limits.measure` makes it.
+    """
+    (found,) = experiments.values()
+    names = meanings_of(found.method)
+    lines = math.ceil(len(names) / _COLUMNS)
+    figure = style.new_figure(title, width=12.0, height=2.1 * lines + 1.0)
+    panels = figure.subplots(lines, _COLUMNS, sharex=True, sharey=True, squeeze=False)
+    for k, (name, panel) in enumerate(zip(names, panels.flat, strict=False)):
+        _panel(panel, found.isel(method=k), limit_of(found.omega_h.values, within(found, k, OFF[-1])).passes)
+        panel.set_title(effort_ladder.name_of(name))
+    for panel in panels.flat[len(names) :]:
+        panel.set_axis_off()
+    for panel in panels.flat[max(0, len(names) - _COLUMNS) : len(names)]:
+        panel.set_xlabel("ωh [1]")
+        panel.tick_params(labelbottom=True)
+    for line in panels:
+        line[0].set_ylabel("restitution e [1]")
+    figure.legend(handles=_legend(), loc="outside right center")
+    style.add_note(figure, engine_notes.line([found]))
+    return figure
+
+
+def _panel(panel: Any, found: xr.Dataset, limit: float) -> None:
+    omega_h, restitution = found.omega_h.values, found.restitution.values
+    exact = float(found.exact_restitution)
+    left = np.isfinite(restitution).any(axis=1)
+    low, high = (np.full(len(omega_h), np.nan) for _ in range(2))
+    low[left], high[left] = np.nanmin(restitution[left], axis=1), np.nanmax(restitution[left], axis=1)
+    panel.set_xscale("log")
+    panel.axhspan(exact * (1 - OFF[-1]), exact * (1 + OFF[-1]), color=style.FAINT, alpha=0.7, linewidth=0)
+    panel.axhline(exact, color=style.INK, linewidth=0.9, linestyle="--")
+    panel.axvline(linear_theory.STABILITY_LIMIT, color=style.VERMILION, linewidth=1.0, linestyle=":")
+    panel.fill_between(omega_h, low, high, color=style.BLUE, alpha=0.35, linewidth=0)
+    for edge in (low, high):
+        panel.plot(omega_h, edge, color=style.BLUE, linewidth=1.0)
+    stays = (found.outcome.values != OUTCOMES.index("leaves")).any(axis=1)
+    panel.plot(omega_h, np.where(stays, 0.0, np.nan), **_STAYS)
+    if not math.isnan(limit) and limit < omega_h[-1]:
+        panel.axvline(limit, color=style.GREEN, linewidth=1.2)
+    top = float(np.nanmax(high))
+    if top > _HIGHEST:
+        told = f"↑ to e = {top:.3g}\nat ωh = {omega_h[int(np.nanargmax(high))]:.3g}"
+        panel.text(0.03, 0.95, told, transform=panel.transAxes, ha="left", va="top", fontsize=7.5)
+    panel.set_ylim(-0.12, _HIGHEST)
+    panel.set_xlim(omega_h[0], omega_h[-1])
+    panel.xaxis.set_major_locator(FixedLocator([0.02, 0.1, 0.5, 2, 10]))
+    panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    panel.xaxis.set_minor_formatter(NullFormatter())
+
+
+_STAYS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5, "color": style.INK}
+
+
+def _legend() -> list[Any]:
+    return [
+        Patch(color=style.BLUE, alpha=0.35, label="least to most over\nthe phases of the step\nat touch-down"),
+        Line2D([], [], color=style.INK, linewidth=0.9, linestyle="--", label="exact"),
+        Patch(color=style.FAINT, label=f"within {OFF[-1]:.0%} of it"),
+        Line2D([], [], color=style.GREEN, label="all phases within,\nup to here"),
+        Line2D([], [], color=style.VERMILION, linestyle=":", label="ωh = 2: symplectic Euler's\nlimit of stability"),
+        Line2D([], [], label="at some phase it does\nnot leave the ground", **_STAYS),
+    ]

@@ -1,0 +1,52 @@
+"""How many steps a second, by every method: a bar each, over two problems."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from stiffdice.experiments.work_precision.problems import PROBLEMS
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report import number_format
+from stiffdice.report.figures import effort_ladder, style
+from stiffdice.report.tables import engine_notes
+from stiffdice.simulation.engines import stepper
+
+_COLORS = (style.BLUE, style.ORANGE)
+_HATCH = "////"
+
+
+def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return bars; timings: one, as `experiments.engine_speed.time` makes it."""
+    (found,) = timings.values()
+    names, problems = meanings_of(found.method), meanings_of(found.problem)
+    rates = found.taken.values / found.seconds.values
+    order = np.argsort(np.nan_to_num(np.nanmax(rates, axis=0)))
+    figure = style.new_figure(title, width=8.5, height=0.5 * len(names) + 1.7)
+    panel = figure.subplots()
+    thick = 0.8 / len(problems)
+    for p in range(len(problems)):
+        for place, k in enumerate(order):
+            if np.isnan(rates[p, k]):
+                continue
+            across = place + (len(problems) - 1 - 2 * p) / 2 * thick
+            hatch = _HATCH if stepper.own_steps(names[k]) else None
+            panel.barh(across, rates[p, k], thick, color=_COLORS[p], hatch=hatch, edgecolor="white", linewidth=0.5)
+            told = number_format.readable(float(f"{rates[p, k]:.2g}"))
+            panel.annotate(told, (rates[p, k], across), (3, 0), textcoords="offset points", va="center", fontsize=7.5)
+    panel.set_yticks(range(len(names)), [effort_ladder.name_of(names[k]) for k in order])
+    panel.set(xscale="log", xlabel="steps a second [1/s]")
+    panel.set_xlim(np.nanmin(rates) / 3, np.nanmax(rates) * 5)
+    panel.grid(visible=False, axis="y")
+    handles = [Patch(color=color, label=PROBLEMS[name].name) for color, name in zip(_COLORS, problems, strict=True)]
+    handles.append(
+        Patch(facecolor="white", edgecolor=style.QUIET, hatch=_HATCH, label="force evaluations: takes its own steps")
+    )
+    panel.legend(handles=handles, loc="lower right")
+    machine = f"One thread of {found.attrs['machine_processor']}, medians of warm runs."
+    style.add_note(figure, f"{machine} {engine_notes.line([found])}")
+    return figure

@@ -1,0 +1,158 @@
+"""The atlas of where and how runs fail: a map for each number of the scene and contact law, verdicts over steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib import patheffects
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from stiffdice.dynamics.state import Array
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report import number_format
+from stiffdice.report.figures import style
+from stiffdice.simulation.outcome import Verdict
+
+_NAMES = {
+    "stiffness": "stiffness S [kg/s²]",
+    "damping": "damping D [kg/s]",
+    "friction": "friction coefficient μ [1]",
+    "mass": "mass m [kg]",
+    "radius": "radius r [m]",
+    "spin": "rate of spin [rad/s]",
+    "start": "start [by name]",
+}
+_LIMIT_LOOKS: dict[str, dict[str, Any]] = {
+    "contact": {"linestyle": "-", "label": "theory: fastest contact, ωh = 2(√(1 + ζ²) − ζ)"},
+    "drag": {"linestyle": "--", "label": "theory: drag in mid-air (ungated), 8 D h/m = 2, or 12 if it turns"},
+    "turn": {"linestyle": "-.", "label": "theory: half a turn in a step"},
+    "stall": {"linestyle": ":", "label": "theory: a step at launch is half a unit in the last place of z"},
+}
+# Between the row of zero and the others, in rows.
+_GAP = 0.4
+
+
+def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the maps, two for each axis side by side, with theory's limits over them.
+
+    experiments: one for each axis, as `experiments.extremes.measure` makes them.
+    """
+    found = list(experiments.values())
+    rows = math.ceil(len(found) / 2)
+    figure = style.new_figure(title, width=13.0, height=0.6 + 3.0 * rows + (1.6 if len(found) % 2 == 0 else 0.0))
+    panels = figure.subplots(rows, 4, squeeze=False).reshape(rows * 2, 2)
+    for pair, dataset in zip(panels, found, strict=False):
+        for law, panel in enumerate(pair):
+            _map(panel, dataset, law)
+            if law:
+                panel.tick_params(labelleft=False)
+            else:
+                panel.set_ylabel(_NAMES[dataset.attrs["axis"]])
+    handles = _legend(found)
+    if len(found) % 2:
+        for panel in panels[-1]:
+            panel.remove()
+        free = figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.55, 0.05))
+        free.set_in_layout(False)
+    else:
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _map(panel: Any, dataset: xr.Dataset, law: int) -> None:
+    steps, heights = dataset.steps.values, _rows(dataset)
+    edges = _edges(np.log10(steps))
+    step = _height(heights)
+    names = meanings_of(dataset.verdict)
+    for height, verdicts in zip(heights, dataset.verdict.values[law], strict=True):
+        changes = np.flatnonzero(np.diff(verdicts)) + 1
+        for first, last in zip([0, *changes], [*changes, len(verdicts)], strict=True):
+            left, right = 10.0 ** edges[[first, last]]
+            place = {"xy": (left, height - step / 2), "width": right - left, "height": step}
+            panel.add_patch(Rectangle(**place, **_fill(names[verdicts[first]])))
+    for name, limits in zip(meanings_of(dataset.limit), dataset.limit_steps.values[:, law], strict=True):
+        _limit(panel, heights, limits, name)
+    panel.set(xscale="log", xlim=10 ** edges[[0, -1]], ylim=(heights.min() - step / 2, heights.max() + step / 2))
+    panel.grid(visible=False)
+    panel.set_yticks(*_ticks(dataset, heights))
+    panel.set_xlabel("time steps [1]")
+    contact = meanings_of(dataset.contact)[law]
+    panel.set_title(f"{dataset.attrs['axis']}, {style.LAW_NAMES[contact]}")
+
+
+def _fill(verdict: str) -> dict[str, Any]:
+    look = style.VERDICT_LOOKS[verdict]
+    hatched = "hatch" in look
+    return {
+        "facecolor": look["color"],
+        "edgecolor": style.QUIET if hatched else "white",
+        "hatch": look.get("hatch"),
+        "linewidth": 0.0 if hatched else 0.4,
+    }
+
+
+def _rows(dataset: xr.Dataset) -> Array:
+    """Return where each value lies: named ones in order, numbers by their logarithm, zero below all others."""
+    if "flag_meanings" in dataset["value"].attrs:
+        return np.arange(dataset.sizes["value"], dtype=float)
+    values = dataset["value"].values
+    heights = np.log10(np.where(values > 0, values, np.nan))
+    return np.nan_to_num(heights, nan=np.nanmin(heights) - _height(heights[values > 0]) - _GAP)
+
+
+def _height(heights: Array) -> float:
+    """Return how high a row is: as far as the nearest two are apart."""
+    return float(np.diff(np.sort(heights)).min()) if len(heights) > 1 else 1.0
+
+
+def _edges(centres: Array) -> Array:
+    """Return the edges of cells around these, half way to the next."""
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.25, centres[0] + 0.25])
+    middle = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+
+
+def _limit(panel: Any, heights: Array, limits: Array, name: str) -> None:
+    """Draw a limit, a line through all numbers but zero and a stroke for each row that stands alone."""
+    step = _height(heights)
+    look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.3}
+    look["path_effects"] = [patheffects.withStroke(linewidth=2.6, foreground="white")]
+    numbers = heights > heights.min() + step if np.diff(np.sort(heights))[:1] > step else np.ones(len(heights), bool)
+    if heights.dtype.kind == "f" and numbers.sum() > 1:
+        panel.plot(limits[numbers], heights[numbers], label=name, **look)
+    for height, limit in zip(heights[~numbers], limits[~numbers], strict=True):
+        panel.plot([limit, limit], [height - step / 2, height + step / 2], label=name, **look)
+
+
+def _ticks(dataset: xr.Dataset, heights: Array) -> tuple[Array, list[str]]:
+    value = dataset["value"]
+    if "flag_meanings" in value.attrs:
+        names = meanings_of(value)
+        return heights, [names[int(k)].replace("_", " ") for k in value.values]
+    shown = np.arange(len(heights))
+    if len(heights) > 12:
+        numbers = np.flatnonzero(value.values > 0)
+        shown = np.concatenate([np.flatnonzero(value.values == 0), numbers[:: math.ceil(len(numbers) / 8)]])
+    return heights[shown], [number_format.readable(float(value.values[k])) for k in shown]
+
+
+def _legend(found: list[xr.Dataset]) -> list[Any]:
+    names = meanings_of(found[0].verdict)
+    occurring = {names[verdict] for dataset in found for verdict in np.unique(dataset.verdict.values)}
+    handles: list[Any] = [
+        Patch(**_fill(name) | {"linewidth": 0.4, "edgecolor": style.QUIET}, label=Verdict[name.upper()].sentence)
+        for name in style.VERDICT_LOOKS
+        if name in occurring
+    ]
+    limits = meanings_of(found[0].limit)
+    for name, look in _LIMIT_LOOKS.items():
+        if any(np.isfinite(dataset.limit_steps.values[limits.index(name)]).any() for dataset in found):
+            handles.append(Line2D([], [], color=style.INK, linewidth=1.3, **look))
+    return handles

@@ -1,0 +1,155 @@
+"""The comb: at one stiffness, numbers of steps that pass between numbers that fail."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report import number_format
+from stiffdice.report.figures import style
+
+# The paper's step counts at high stiffness, by the figures that show them; and that stiffness [kg/s²] and duration [s].
+PAPER_STEPS = {"figures 9 and 10": 10_000, "figures 11 and 12": 20_000}
+PAPER_SCENE = 1e6, 10.0
+_PAPER_LOOK: dict[str, Any] = {"linestyle": "none", "marker": "^", "color": style.INK, "markersize": 6}
+
+_OMEGA_H = (4.0, 3.0, 2.0, 1.5, 1.2, 1.0, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
+
+# Magic steps beyond this n are not drawn: they lie too close.
+_LAST = 12
+
+# The first criterion has the widest line, the last the thinnest: all that lie on each other show.
+_WIDTHS = (3.6, 2.8, 1.8, 1.2, 0.7)
+
+
+def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the share of members that pass against the number of steps, a panel for each contact law and stiffness.
+
+    sweeps: as `stability_limits.find` makes them, cells sorted. A criterion that all members of a panel pass is told,
+    not drawn.
+    """
+    scans = [scan for found in sweeps.values() for scan in _scans(found)]
+    figure = style.new_figure(title, width=10.5, height=1.3 + 2.6 * len(scans))
+    panels = figure.subplots(len(scans), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for panel, scan in zip(panels, scans, strict=True):
+        _shares(panel, scan)
+        _theory(panel, scan)
+        panel.set_title(_named(scan))
+        panel.set_ylabel("share of members\nthat pass [1]")
+    steps = np.concatenate([scan.cell_steps.values for scan in scans])
+    room = 0.02 * (steps.max() - steps.min())
+    panels[-1].set(xlim=(steps.min() - room, steps.max() + 2 * room), ylim=(-0.08, 1.18), yticks=np.linspace(0, 1, 6))
+    duration = json.loads(scans[0].attrs["scene"])["duration"]
+    panels[-1].set_xlabel(f"time steps in {duration:g} s [1]")
+    panels[-1].xaxis.set_major_formatter("{x:,.0f}")
+    figure.legend(handles=_legend(scans), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _scans(found: xr.Dataset) -> Iterator[xr.Dataset]:
+    """Give the cells of one contact law and stiffness after the other."""
+    laws, stiffnesses = found.cell_contact.values, found.cell_stiffness.values
+    for law, stiffness in sorted(set(zip(laws.tolist(), stiffnesses.tolist(), strict=True))):
+        yield found.isel(cell=(laws == law) & (stiffnesses == stiffness))
+
+
+def _criteria(scan: xr.Dataset) -> tuple[dict[str, xr.Dataset], list[str]]:
+    """Return what was found by criterion, and the names of those that all members pass everywhere, left out of it."""
+    by_name = {name: scan.isel(criterion=c) for c, name in enumerate(meanings_of(scan.criterion))}
+    passed = [name for name, found in by_name.items() if (found.pass_fraction == 1).all()]
+    return {name: found for name, found in by_name.items() if name not in passed}, passed
+
+
+def _shares(panel: Any, scan: xr.Dataset) -> None:
+    steps = scan.cell_steps.values
+    for name, found in _criteria(scan)[0].items():
+        color = style.CRITERION_LOOKS[name]["color"]
+        panel.fill_between(
+            steps, found.pass_fraction_low, found.pass_fraction_high, color=color, alpha=0.12, linewidth=0, zorder=1.5
+        )
+        panel.plot(steps, found.pass_fraction, color=color, linewidth=_width(name), label=name, zorder=2.5)
+
+
+def _width(criterion: str) -> float:
+    return dict(zip(style.CRITERION_LOOKS, _WIDTHS, strict=False)).get(criterion, _WIDTHS[-1])
+
+
+def _theory(panel: Any, scan: xr.Dataset) -> None:
+    """Mark what theory says of some step counts, and those that the paper took."""
+    steps = scan.cell_steps.values
+    product = float(scan.cell_omega_h[0] * scan.cell_steps[0])  # ωh times steps is the same for all
+    marks = {
+        f"n = {n}": step
+        for n, step in linear_theory.magic_steps(product / steps[-1], product / steps[0], _LAST).items()
+    }
+    for name, omega_h in marks.items():
+        panel.axvline(product / omega_h, color=style.INK, linewidth=0.8, linestyle=":", zorder=2)
+        _label(panel, product / omega_h, name)
+    limit = product / linear_theory.STABILITY_LIMIT
+    if steps[0] <= limit <= steps[-1]:
+        panel.axvline(limit, color=style.INK, linewidth=1.0, linestyle="--", zorder=2)
+        _label(panel, limit, "ωh = 2")
+    taken = [count for count in PAPER_STEPS.values() if _of_the_paper(scan) and steps[0] <= count <= steps[-1]]
+    panel.plot(taken, [-0.05] * len(taken), **_PAPER_LOOK)
+    shown = [value for value in _OMEGA_H if steps[0] <= product / value <= steps[-1]]
+    top = style.top_axis(panel, [product / value for value in shown], [f"{value:g}" for value in shown])
+    top.set_xlabel("ωh of a flat landing [1]", fontsize=7.5)
+
+
+def _label(panel: Any, steps: float, text: str) -> None:
+    panel.annotate(
+        text,
+        (steps, 1.17),
+        xytext=(3, 0),
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        fontsize=7.5,
+        color=style.INK,
+    )
+
+
+def _of_the_paper(scan: xr.Dataset) -> bool:
+    return (float(scan.cell_stiffness[0]), json.loads(scan.attrs["scene"])["duration"]) == PAPER_SCENE
+
+
+def _named(scan: xr.Dataset) -> str:
+    ground = json.loads(scan.attrs["scene"])["ground"]
+    law = style.LAW_NAMES[meanings_of(scan.cell_contact)[int(scan.cell_contact[0])]] + style.maker_of(scan)
+    passed = _criteria(scan)[1]
+    return (
+        f"{law}, S = {number_format.readable(float(scan.cell_stiffness[0]))} kg/s², "
+        f"D = {number_format.readable(ground['damping'])} kg/s, μ = {number_format.readable(ground['friction'])}"
+        + (f"; all pass: {', '.join(passed)}" if passed else "")
+    )
+
+
+def _legend(scans: Sequence[xr.Dataset]) -> list[Any]:
+    pairs = dict.fromkeys(
+        (name, float(found.tolerance)) for scan in scans for name, found in _criteria(scan)[0].items()
+    )
+    handles: list[Any] = [
+        Line2D(
+            [],
+            [],
+            color=style.CRITERION_LOOKS[name]["color"],
+            linewidth=_width(name),
+            label=style.criterion_words(name, tolerance),
+        )
+        for name, tolerance in pairs
+    ]
+    handles.append(Patch(color=style.QUIET, alpha=0.3, linewidth=0, label="95 % confidence (Wilson)"))
+    handles.append(Line2D([], [], color=style.INK, linewidth=0.8, linestyle=":", label="magic step, ωh = 2 sin(π/2n)"))
+    if any(_of_the_paper(scan) for scan in scans):
+        paper = ", ".join(f"{steps:,} ({where})" for where, steps in PAPER_STEPS.items())
+        handles.append(Line2D([], [], label=f"the paper's steps: {paper}", **_PAPER_LOOK))
+    return handles

@@ -1,0 +1,125 @@
+"""Figure 13: the steps that a stiffness needs, by criterion and contact law, with the scan that says so."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report.figures import style
+from stiffdice.sweep.stability_limits import EDGES, FIT, band
+
+_MODELS = {
+    "vertical": "a cube that falls straight",
+    "sliding": "a cube that slides",
+    "tumbling": "a cube that tumbles",
+    "flying": "a cube in flight",
+}
+
+
+def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return steps against stiffness above, and the same edges as ωh below, a column for each sweep and contact law."""
+    columns = [found.isel(contact=k) for found in sweeps.values() for k in range(found.sizes["contact"])]
+    figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=7.4)
+    panels = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
+    for (upper, lower), frontier in zip(panels.T, columns, strict=True):
+        law = style.LAW_NAMES[meanings_of(frontier.contact)[int(frontier.contact)]] + style.maker_of(frontier)
+        upper.set_title(
+            law if len(sweeps) == 1 else f"{_MODELS.get(frontier.attrs['model'], frontier.attrs['model'])}, {law}"
+        )
+        _steps(upper, frontier)
+        _omega_h(lower, frontier)
+        lower.set_xlabel("stiffness S [kg/s²]")
+    notes = max(len(panel.texts) for panel in panels[0])
+    panels[0, 0].set_ylim(top=panels[0, 0].get_ylim()[1] * 10 ** (0.12 * notes))  # room for them above the lines
+    duration = json.loads(columns[0].attrs["scene"])["duration"]
+    panels[0, 0].set_ylabel(f"time steps in {duration:g} s [1]")
+    panels[1, 0].set_ylabel("ωh of a flat landing [1]")
+    figure.legend(handles=_legend(columns), loc="outside lower center", ncols=3 if len(columns) > 1 else 1)
+    return figure
+
+
+def _steps(panel: Any, frontier: xr.Dataset) -> None:
+    stiffness = frontier.stiffness.values
+    panel.set(xscale="log", yscale="log")
+    panel.plot(stiffness, frontier.limit, color=style.INK, linestyle="--", linewidth=1.0, zorder=4)
+    notes = []
+    for criterion, found in _by_criterion(frontier):
+        look = style.CRITERION_LOOKS[criterion]
+        first, last = found.first_pass.values, found.last_fail.values
+        panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.10, linewidth=0)
+        _marks(panel, stiffness, first, last, look)
+        fit = {name: float(found[name].isel(edge=list(EDGES).index("last_fail"))) for name in FIT}
+        if np.isfinite(fit["exponent"]):
+            low, high = band(fit, stiffness)
+            panel.fill_between(stiffness, low, high, color=look["color"], alpha=0.25, linewidth=0)
+            panel.plot(stiffness, fit["factor"] * stiffness ** fit["exponent"], color=look["color"], linewidth=0.8)
+            digits = 3 if fit["exponent_error"] >= 5e-4 else 4
+            power = rf"$S^{{\,{fit['exponent']:.{digits}f}\pm{fit['exponent_error']:.{digits}f}}}$"
+            notes.append((f"{criterion}: last fail ∝ {power}", look["color"]))
+    never_broken = set(meanings_of(frontier.criterion)) - {name for name, _ in _by_criterion(frontier)}
+    notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in sorted(never_broken)]
+    for k, (note, color) in enumerate(notes):
+        panel.text(0.03, 0.97 - 0.06 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
+
+
+def _by_criterion(frontier: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Return the criteria that some member breaks, each with what was found of it."""
+    names = meanings_of(frontier.criterion)
+    broken = frontier.pass_fraction.values.min(axis=1) < 1
+    return [(name, frontier.isel(criterion=c)) for c, name in enumerate(names) if broken[c]]
+
+
+def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str, str]) -> None:
+    """Draw last fail full and first pass open, the open mark larger, so that neither hides the other."""
+    panel.plot(stiffness, last, look["last"], color=look["color"], markersize=3.5, zorder=3)
+    panel.plot(stiffness, first, look["first"], color=look["color"], markersize=5.5, markerfacecolor="none", zorder=4)
+
+
+def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
+    """Draw the edges as ωh, over all scanned cells: a dot each, dark where members fail."""
+    panel.set(xscale="log", yscale="log")
+    scan = frontier.isel(cell=frontier.cell_contact.values == int(frontier.contact))
+    panel.scatter(
+        scan.cell_stiffness,
+        scan.cell_omega_h,
+        c=1 - scan.pass_fraction.values.min(axis=0),
+        s=2.5,
+        cmap="Greys",
+        vmin=-0.15,
+        vmax=1.3,
+        linewidths=0,
+        rasterized=True,  # as a drawing it would be 170 bytes a cell
+    )
+    panel.axhline(linear_theory.STABILITY_LIMIT, color=style.INK, linestyle="--", linewidth=1.0)
+    scale = frontier.limit.values * linear_theory.STABILITY_LIMIT
+    for criterion, found in _by_criterion(frontier):
+        first, last = (scale / found[edge].values for edge in ("first_pass", "last_fail"))
+        _marks(panel, frontier.stiffness, first, last, style.CRITERION_LOOKS[criterion])
+    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.yaxis.set_major_formatter("{x:g}")
+    panel.yaxis.set_minor_locator(NullLocator())
+
+
+def _legend(columns: list[xr.Dataset]) -> list[Any]:
+    handles: list[Any] = []
+    tolerances = {name: float(found.tolerance) for frontier in columns for name, found in _by_criterion(frontier)}
+    hop_height = columns[0].attrs.get("hop_height")
+    for criterion, tolerance in tolerances.items():
+        look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance, hop_height)
+        common: Any = {"linestyle": "none", "color": look["color"]}
+        open_mark: Any = {"marker": look["first"], "markersize": 5.5, "markerfacecolor": "none"}
+        handles.append(Line2D([], [], label=f"first pass: {words}", **open_mark, **common))
+        handles.append(Line2D([], [], marker=look["last"], markersize=4, label=f"last fail: {words}", **common))
+    handles.append(Line2D([], [], color=style.INK, linestyle="--", label="theory: ωh = 2"))
+    handles.append(Patch(color=style.QUIET, label="scanned cell, darker: more fail"))
+    return handles

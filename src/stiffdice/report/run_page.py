@@ -1,0 +1,111 @@
+"""What is said of a run: doubts before it, and afterwards what its verdict rests on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.rotation import along
+from stiffdice.dynamics.state import TOUCHING, TURNING, start_of
+from stiffdice.integrators import linear_stability
+from stiffdice.integrators import registry as schemes
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation.backend import OURS
+from stiffdice.simulation.criteria.registry import CRITERIA
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.run import Run
+
+# Densities [kg/m³] beyond which a cube is rather a slip in a unit: below hydrogen's, above osmium's several times.
+_DENSITIES = 0.08, 1e5
+
+
+def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
+    """Return what speaks against a run before it is made, a line each.
+
+    scheme: an engine's own has no limit that is known here. Raises InputError for a model that does not fit the scene.
+    """
+    said = [*_of_density(scene), *_of_start(scene, model)]
+    turn = float(linear_stability.half_turn_steps(scene, np.array(scene.launch.spin)))
+    if model in TURNING & TOUCHING and steps < turn and scheme not in schemes.OWN_STEPS:
+        said.append(
+            f"launch.angular_momentum turns the cube by {math.pi * turn / steps:.3g} rad in a step, more than half a "
+            f"turn; {_rounded_up(turn)} steps or more resolve it"
+        )
+    fewest = max(linear_stability.fewest_steps(scene, model, scheme)) if scheme in schemes.SCHEMES else 0.0
+    if steps < fewest:
+        said.append(f"{steps:,} steps are beyond the limit of linear stability: {_needed(scheme, fewest)}")
+    return said
+
+
+def _needed(scheme: str, fewest: float) -> str:
+    if math.isinf(fewest):
+        return f"{scheme} has none on this ground; symplectic_euler or event has"
+    return f"{scheme} needs {_rounded_up(fewest)} or more"
+
+
+def _rounded_up(steps: float) -> str:
+    """Return a number of steps in two digits, not less than it."""
+    if not 0 < steps < 1e9:
+        return f"{steps:.2g}"
+    unit = 10.0 ** (math.floor(math.log10(steps)) - 1)
+    return f"{math.ceil(steps / unit) * unit:,.0f}"
+
+
+def _of_density(scene: Scene) -> list[str]:
+    density = scene.cube.mass / scene.cube.side / scene.cube.side / scene.cube.side
+    if _DENSITIES[0] <= density <= _DENSITIES[1]:
+        return []
+    size = f"{scene.cube.side:g} m of side, {scene.cube.mass:g} kg"
+    return [f"the cube has a density of {density:.2g} kg/m³ ({size}); the units are m and kg"]
+
+
+def _of_start(scene: Scene, model: str) -> list[str]:
+    """Say by how much the cube starts below the ground, if that is more than it sinks in at rest."""
+    start = start_of(scene, model)[0]
+    heights = along(start["position"] + start["node_offset"], scene.ground.normal)
+    depth = -float(heights.min())
+    if not depth > 2 * min(linear_theory.sag(scene), scene.cube.side):
+        return []
+    stored = 0.5 * scene.ground.stiffness * float((np.minimum(heights, 0.0) ** 2).sum())
+    return [
+        f"launch.position: the cube starts in the ground, its lowest node {depth:.3g} m deep; "
+        f"the springs hold {stored:.3g} J and throw it out"
+    ]
+
+
+def lines(run: Run, name: str, advise: str) -> list[str]:
+    """Return how a run of one member ended, and what that was looked at by.
+
+    name: of its file. advise: the command that tells how accurate such a run is.
+    """
+    verdict = Verdict(run.verdict[0])
+    said = [f"{name}: {verdict.sentence}", *(_looked_at(run, criterion) for criterion in run.tolerances)]
+    said.append(f"  steps     {_steps(run)}")
+    if run.simulator == OURS:
+        said.append(f"  accuracy  was not looked at; this does: {advise}")
+    return said
+
+
+def _looked_at(run: Run, criterion: str) -> str:
+    part, tolerance = CRITERIA[criterion], run.tolerances[criterion]
+    measure = float(run.measures[part.MEASURE][0])
+    if criterion == "apex" and measure == 0:
+        return f"  {criterion:9} no rebound to compare with the one before"
+    return f"  {criterion:9} {measure:.6g}, allowed {part.BASE + tolerance:g}: {part.LONG_NAME}"
+
+
+def _steps(run: Run) -> str:
+    if run.simulator != OURS:
+        return f"ωh = {linear_theory.omega_h(run.scene, run.steps):.3g} of a flat landing"
+    if run.scheme in schemes.OWN_STEPS or run.scheme == "exact":
+        return f"{run.scheme} has no limit of stability; its steps are output intervals"
+    mode = linear_stability.hardest(run.scene, run.model)
+    if mode.omega == 0:
+        return "nothing springs back, so that no contact limits the step"
+    omega_h = mode.omega * run.scene.duration / run.steps
+    limit = linear_stability.stability_limit(run.scheme, mode.zeta)
+    if math.isinf(limit):
+        return f"ωh = {omega_h:.3g} ({mode.mode}); {run.scheme} is stable at any"
+    return f"ωh = {omega_h:.3g}, linear limit {limit:.3g} ({run.scheme}; {mode.mode})"

@@ -1,0 +1,1 @@
+"""Datasets in, Markdown tables out."""

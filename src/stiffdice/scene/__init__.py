@@ -1,0 +1,1 @@
+"""The physical problem: cube, ground and launch, validated."""

@@ -1,0 +1,1 @@
+"""Runs: launch, monitoring, criteria, outcome; other engines behind the same interface."""

@@ -1,0 +1,1 @@
+"""What counts as stable: one criterion per module."""

@@ -1,0 +1,144 @@
+"""What counts as stable. A criterion is a module; one line registers it.
+
+A criterion watches a run step by step and keeps the worst it has seen, its measure; it holds while the measure is at
+most BASE + tolerance. It says with BY_DEFAULT whether it is asked where a study names none, with FOR_TURNING whether it
+means anything for a cube that turns, with FAILURE which verdict a run gets that breaks it, and with SLOTS how many
+numbers it has to remember, the measure first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.state import TURNING, Array
+from stiffdice.errors import InputError
+from stiffdice.simulation.criteria import apex, energy, finite, restitution, trajectory
+
+# In the order in which a run is asked; the numbers of the enum in files.
+CRITERIA: dict[str, Any] = {
+    "finite": finite,
+    "energy": energy,
+    "apex": apex,
+    "restitution": restitution,
+    "trajectory": trajectory,
+}
+
+# What all criteria remember of a run: one record a member. limits: the largest measures with which they still hold,
+# infinite where a criterion is not to end the run; decided: the step that decided each, 0 for none yet. (In a record,
+# because an array handed to compiled functions at every step would cost a reference count.)
+MEMORY = np.dtype(
+    [
+        ("limits", np.float64, len(CRITERIA)),
+        ("decided", np.int64, len(CRITERIA)),
+        *((name, np.float64, criterion.SLOTS) for name, criterion in CRITERIA.items()),
+    ]
+)
+
+
+def criteria_of(model: str) -> dict[str, Any]:
+    """Return the criteria that mean something for a model."""
+    return {name: part for name, part in CRITERIA.items() if part.FOR_TURNING or model not in TURNING}
+
+
+def tolerances_of(model: str, asked: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Return the tolerance of each criterion that a run of this model is judged by, in the registry's order.
+
+    asked: tolerances by criterion, of which those that mean something for the model are taken; None asks the default
+    criteria at their default tolerances. Raises InputError for a name that is none.
+    """
+    known = criteria_of(model)
+    if asked is None:
+        return {name: part.TOLERANCE for name, part in known.items() if part.BY_DEFAULT}
+    for name in asked:
+        if name not in CRITERIA:
+            raise InputError(f"criteria.{name}: unknown; allowed are {', '.join(CRITERIA)}")
+    return {name: asked[name] for name in known if name in asked}
+
+
+def holds(name: str, measure: npt.ArrayLike, tolerance: float) -> npt.NDArray[np.bool_]:
+    """Return where a criterion holds, shape of `measure`; not-a-number never does."""
+    return np.asarray(np.asarray(measure) <= CRITERIA[name].BASE + tolerance)
+
+
+def values(memory: npt.NDArray[np.void]) -> dict[str, Array]:
+    """Return each criterion's measure, shape (member,), by the measure's name, from an array of MEMORY records."""
+    return {criterion.MEASURE: memory[name][..., 0].copy() for name, criterion in CRITERIA.items()}
+
+
+def limits_of(tolerances: Mapping[str, float]) -> Array:
+    """Return the largest measure with which each criterion still holds, shape (criterion,); infinite if not asked."""
+    return np.array([part.BASE + tolerances[name] if name in tolerances else np.inf for name, part in CRITERIA.items()])
+
+
+@njit
+def open_of(memory: Any) -> int:
+    """Return how many of the criteria that are to end a run are undecided; 1 if none is, so that it never ends."""
+    limited, undecided = 0, 0
+    for k in range(memory.limits.shape[0]):
+        if memory.limits[k] < np.inf:
+            limited += 1
+            undecided += 1 if memory.decided[k] == 0 else 0
+    return undecided if limited > 0 else 1
+
+
+def _starting(names: list[str]) -> Any:
+    """Return a compiled function that lets the criteria of these names begin to watch."""
+    if not names:
+
+        @njit
+        def nothing(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
+            pass
+
+        return nothing
+    name = names[0]
+    this, others = CRITERIA[name].start, _starting(names[1:])
+
+    @njit
+    def start(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
+        this(memory[name], sight, model, law, physics, state)
+        others(memory, sight, model, law, physics, state)
+
+    return start
+
+
+def _observing(names: list[str]) -> Any:
+    """Return a compiled function that shows a step to the criteria of these names, one after another.
+
+    It is put together at import, because compiled code cannot loop over functions; called by its global name it costs
+    nothing and leaves the kernel cacheable on disk.
+    """
+    if not names:
+
+        @njit
+        def nothing(
+            memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any
+        ) -> int:
+            return 0
+
+        return nothing
+    name, k = names[0], list(CRITERIA).index(names[0])
+    this, others = CRITERIA[name].observe, _observing(names[1:])
+
+    @njit
+    def observe(memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any) -> int:
+        measure, settled = this(memory[name], sight, model, law, physics, state, ref)
+        newly = 0
+        if memory.decided[k] == 0 and (settled or measure > memory.limits[k]):
+            memory.decided[k] = step
+            newly = 1 if memory.limits[k] < np.inf else 0
+        return newly + others(memory, step, sight, model, law, physics, state, ref)
+
+    return observe
+
+
+# (memory, sight, model, law, physics, state): begin to watch a run that stands at its launch.
+start = _starting(list(CRITERIA))
+
+# (memory, step, sight, model, law, physics, state, reference) -> how many of the criteria that have a limit this step
+# decides. A criterion is decided when it fails, or can fail no more.
+observe = _observing(list(CRITERIA))

@@ -1,0 +1,1 @@
+"""Other integrators and physics engines on our scenes: one adapter per module."""

@@ -1,0 +1,98 @@
+"""The paper's loop in plain NumPy, as one would write it from the text: a step at a time, the eight nodes at once.
+
+Symplectic Euler in the order of equations 3 to 10 and section 4.2. It agrees with our compiled scheme to round-off,
+which each contact makes larger; what sets it apart is the time of some forty calls of NumPy a step.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, Physics, States, physics_of
+from stiffdice.scene.scene import Scene
+
+LAG = 0.5
+SCHEME = "symplectic_euler"
+
+
+def unfit(scene: Scene, model: str) -> str | None:
+    """Return None: every scene and model can be represented."""
+    return None
+
+
+def versions() -> str:
+    """Return the engine's name and version."""
+    return f"numpy {np.__version__}"
+
+
+def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> NumpyLoop:
+    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
+    return NumpyLoop(scene, model, launch, h)
+
+
+class NumpyLoop:
+    """One run, standing where the last step left it."""
+
+    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
+        """Take the scene's numbers, and the state of the launch, shape (1,)."""
+        self._physics: Physics = physics_of(scene)
+        self._gated, self._model, self._h = scene.ground.contact == "gated", model, h
+        self._normal = np.array(scene.ground.normal)
+        self._weight = np.array([0.0, 0.0, -self._physics.node_weight])
+        (state,) = launch.copy()
+        self._x, self._u, self._nodes = state["position"], state["velocity"], state["node_offset"]
+        self._spin, self._turning = state["angular_momentum"], state["angular_velocity"]
+
+    def advance(self, states: States, every: int) -> int:
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
+        with np.errstate(all="ignore"):  # a run that blows up is a result
+            for state in states:
+                for _ in range(every):
+                    self._step()
+                state["position"], state["velocity"], state["node_offset"] = self._x, self._u, self._nodes
+                state["angular_momentum"], state["angular_velocity"] = self._spin, self._turning
+        return len(states) * every
+
+    def _step(self) -> None:
+        forces = self._forces()
+        self._u = self._u + self._h * forces.sum(axis=0) / self._physics.mass  # equation 6
+        self._x = self._x + self._h * self._u  # equation 7
+        if self._model in TURNING:
+            self._spin = self._spin + self._h * _cross(self._nodes, forces).sum(axis=0)  # equations 8 and 10
+            self._turning = self._spin / self._physics.inertia
+            self._nodes = _rotated(self._nodes, self._turning * self._h)
+
+    def _forces(self) -> Array:
+        """Return the force on each node [N], shape (8, 3): its weight, and what the ground does (section 4.2)."""
+        nodes, normal, physics = self._nodes, self._normal, self._physics
+        if self._model not in TOUCHING:
+            return np.tile(self._weight, (len(nodes), 1))
+        depth = -((self._x + nodes) @ normal)
+        velocity = self._u + (_cross(self._turning, nodes) if self._model in TURNING else np.zeros_like(nodes))
+        speed = velocity @ normal
+        push = np.maximum(0.0, physics.stiffness * np.maximum(0.0, depth) - physics.damping * speed)
+        if self._gated:
+            push[depth <= 0.0] = 0.0
+        if self._model == "vertical":
+            return push[:, None] * normal + self._weight
+        along = velocity - speed[:, None] * normal
+        length = np.sqrt((along * along).sum(axis=1)) + physics.cutoff
+        return push[:, None] * (normal - physics.friction * along / length[:, None]) + self._weight
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Return a × b along the last axis; `numpy.cross` takes several times as long."""
+    ax, ay, az, bx, by, bz = *np.moveaxis(a, -1, 0), *np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _rotated(nodes: Array, rotation: Array) -> Array:
+    """Return nodes turned by a rotation vector [rad] (equation 9)."""
+    angle = math.hypot(*rotation)
+    if angle == 0.0:
+        return nodes
+    axis = rotation / angle
+    along = (nodes @ axis)[:, None] * axis
+    return np.asarray(along + math.cos(angle) * (nodes - along) + math.sin(angle) * _cross(axis, nodes))

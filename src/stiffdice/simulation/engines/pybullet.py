@@ -1,0 +1,206 @@
+"""PyBullet on our scenes: Bullet's contact with stiffness and damping at eight small spheres, solved implicitly.
+
+With `contactStiffness` S and `contactDamping` D Bullet softens a contact (erp = hS/(hS + D), cfm = 1/(h(hS + D))) such
+that the normal force is max(0, S·depth − D·u_n) of the depth and the velocity at the end of the step: implicit Euler.
+It looks ahead: a node that would be in the ground at the end of the step is pressed in it already, then with D·depth/h
+for the dashpot. Without damping a flat bounce is that of our `implicit_euler`, to round-off. The settings:
+
+- The cube is a compound of eight spheres, a millionth of the radius in size, above a plane lowered by that; a box keeps
+  one or two contacts on a flat face. It is a multibody, not one of maximal coordinates, where two directions of
+  friction hinder each other.
+- Bullet adds up the dampings of two bodies, 0.1 unless told otherwise, and their stiffnesses in series: the ground has
+  no damping and no end of stiffness. No slop, restitution or drag, and no limit on the speed, 100 m/s by itself.
+- The contact threshold is as far as a node may come in a step; at Bullet's own, 2 cm, a fast one is seen too late.
+- The solver (projected Gauss-Seidel) goes on until velocities change by less than 10⁻¹² of what they may, or for some
+  10·((ωh)² + 4Dh/m) iterations, 100,000 at most: enough up to ωh = 100.
+- A cube that does not turn has no inverse inertia.
+- Steps are taken in C, as many at a time as a power of two: Bullet finds their number by a division, which may lose
+  one.
+
+What Bullet cannot: friction is Coulomb's in size, and holds at the end of the step, but on a cube that turns it points
+along (v₁/a₁, v₂/a₂) in place of the slip (v₁, v₂), where a₁, a₂ are the inverse masses that the node has for pushes
+along two fixed axes.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+
+import numpy as np
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.rotation import matrices, turned
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation.engines.compatibility import gated_rigid
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let nothing that C code writes reach the standard error."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with open(os.devnull, "w") as nowhere:  # noqa: PTH123
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+with _quiet():  # it tells when it was built
+    import pybullet
+
+LAG = 0.5
+SCHEME = "sequential_impulse"
+
+# Of the spheres that stand for the nodes, in units of the cube's radius: the arm of friction is too long by it.
+_SPHERE = 1e-6
+
+# The solver's residual [1] of velocities, in units of the largest there may be, and most of its iterations: it takes
+# some (ωh)² + 4Dh/m to share the weight among four nodes.
+_RESIDUAL, _FEWEST, _MOST = 1e-12, 200, 100_000
+
+# Steps at once, at most: a power of two.
+_BATCH = 1024
+
+_ENDLESS = 1e300
+
+
+def unfit(scene: Scene, model: str) -> str | None:
+    """Return in one sentence why Bullet cannot represent a scene and model, or None if it can."""
+    return gated_rigid("Bullet", scene, model)
+
+
+def versions() -> str:
+    """Return the engine's name and version."""
+    return f"pybullet {version('pybullet')}"
+
+
+def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> PybulletEngine:
+    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
+    return PybulletEngine(scene, model, launch, h)
+
+
+class PybulletEngine:
+    """One run, standing where the last step left it, in a Bullet server of its own."""
+
+    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
+        """Take the scene's numbers, and the state of the launch, shape (1,)."""
+        self._launch, self._turns, self._h = launch[0].copy(), model in TURNING, h
+        self._inertia, self._batch = scene.cube.moment_of_inertia, 0
+        self._client = pybullet.connect(pybullet.DIRECT)
+        weakref.finalize(self, pybullet.disconnect, self._client)
+        pybullet.setGravity(0, 0, -scene.gravity, physicsClientId=self._client)
+        self._set(scene, _top_speed(scene, self._launch))
+        self._cube = self._add_cube(scene, model)
+        if model in TOUCHING:
+            self._add_ground(scene)
+
+    def advance(self, states: States, every: int) -> int:
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
+        rows = np.empty((len(states), 13))
+        for row in rows:
+            self._step(every)
+            place, turn = pybullet.getBasePositionAndOrientation(self._cube, self._client)
+            velocity, spin = pybullet.getBaseVelocity(self._cube, self._client)
+            row[:] = *place, turn[3], *turn[:3], *velocity, *spin
+        rows[~np.isfinite(rows).all(axis=1)] = np.nan
+        self._put(states, rows[:, :7], rows[:, 7:])
+        return len(states) * every
+
+    def _step(self, steps: int) -> None:
+        while steps:
+            batch = min(_BATCH, 1 << steps.bit_length() - 1)
+            if batch != self._batch:
+                pybullet.setPhysicsEngineParameter(
+                    fixedTimeStep=self._h * batch, numSubSteps=batch, physicsClientId=self._client
+                )
+                self._batch = batch
+            pybullet.stepSimulation(self._client)
+            steps -= batch
+
+    def _put(self, states: States, places: Array, velocities: Array) -> None:
+        states[:] = self._launch
+        states["position"], states["velocity"] = places[:, :3], velocities[:, :3]
+        if self._turns:
+            states["angular_velocity"] = velocities[:, 3:]
+            states["angular_momentum"] = self._inertia * velocities[:, 3:]
+            states["node_offset"] = turned(matrices(places[:, 3:]), self._launch["node_offset"])
+
+    def _set(self, scene: Scene, speed: float) -> None:
+        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self._h
+        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self._h / scene.cube.mass
+        # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
+        residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
+        pybullet.setPhysicsEngineParameter(
+            numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
+            solverResidualThreshold=residual * residual,
+            contactBreakingThreshold=speed * self._h + 4 * _SPHERE * scene.cube.radius,
+            contactSlop=0,
+            restitutionVelocityThreshold=0,
+            enableConeFriction=1,
+            physicsClientId=self._client,
+        )
+
+    def _add_cube(self, scene: Scene, model: str) -> int:
+        cube, ground, launch = scene.cube, scene.ground, self._launch
+        nodes = launch["node_offset"]
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[pybullet.GEOM_SPHERE] * len(nodes),
+            radii=[_SPHERE * cube.radius] * len(nodes),
+            collisionFramePositions=nodes.tolist(),
+            physicsClientId=self._client,
+        )
+        body: int = pybullet.createMultiBody(
+            cube.mass, shape, basePosition=launch["position"].tolist(), physicsClientId=self._client
+        )
+        pybullet.changeDynamics(
+            body,
+            -1,
+            contactStiffness=ground.stiffness,
+            contactDamping=ground.damping,
+            lateralFriction=ground.friction if model != "vertical" else 0,
+            localInertiaDiagonal=[self._inertia if self._turns else 0] * 3,
+            maxJointVelocity=_ENDLESS,
+            **_PLAIN,
+            physicsClientId=self._client,
+        )
+        spin = launch["angular_momentum"] / self._inertia if self._turns else np.zeros(3)
+        pybullet.resetBaseVelocity(body, launch["velocity"].tolist(), spin.tolist(), self._client)
+        return body
+
+    def _add_ground(self, scene: Scene) -> None:
+        normal = np.array(scene.ground.normal)
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_PLANE, planeNormal=normal.tolist(), physicsClientId=self._client
+        )
+        lowered = (-_SPHERE * scene.cube.radius * normal).tolist()
+        body = pybullet.createMultiBody(0, shape, basePosition=lowered, physicsClientId=self._client)
+        pybullet.changeDynamics(
+            body,
+            -1,
+            contactStiffness=_ENDLESS,
+            contactDamping=0,
+            lateralFriction=1,  # the two are multiplied
+            **_PLAIN,
+            physicsClientId=self._client,
+        )
+
+
+_PLAIN = {"restitution": 0, "spinningFriction": 0, "rollingFriction": 0, "linearDamping": 0, "angularDamping": 0}
+
+
+def _top_speed(scene: Scene, launch: np.void) -> float:
+    """Return a speed [m/s] that no node exceeds within the duration, unless the run gains energy."""
+    physics = physics_of(scene)
+    fall = math.hypot(*launch["velocity"]) + physics.gravity * scene.duration
+    turning = math.hypot(*launch["angular_momentum"]) / math.sqrt(physics.mass * physics.inertia)
+    return math.hypot(fall, turning) * (1 + physics.reach * math.sqrt(physics.mass / physics.inertia))

@@ -1,0 +1,66 @@
+"""What a run is compared with: the same launch on the same ground, computed finely, in one table.
+
+A reference is the scene's own launch under the same scheme at so small a step that its own error does not matter
+(it is measured by a second run at half the steps). Member k of an ensemble enters the same flight a little late; it is
+compared at the time since the scene's launch.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.state import Array
+
+SAMPLES = 2048
+
+# horizon [s]: until when to compare, −1 for not at all; spacing [s] of the samples; position [m], velocity [m/s].
+REFERENCE = np.dtype(
+    [
+        ("horizon", np.float64),
+        ("spacing", np.float64),
+        ("position", np.float64, (SAMPLES + 1, 3)),
+        ("velocity", np.float64, (SAMPLES + 1, 3)),
+    ]
+)
+
+
+def none() -> npt.NDArray[np.void]:
+    """Return a reference that nothing is compared with, shape (1,)."""
+    reference = np.zeros(1, REFERENCE)
+    reference["horizon"] = -1.0
+    return reference
+
+
+def tabulated(horizon: float, position: Array, velocity: Array) -> npt.NDArray[np.void]:
+    """Return references, shape (member,), from positions [m] and velocities [m/s], shape (member, SAMPLES + 1, 3).
+
+    The samples are evenly spread from time 0 to horizon [s].
+    """
+    references = np.zeros(len(position), REFERENCE)
+    references["horizon"] = horizon
+    references["spacing"] = horizon / SAMPLES
+    references["position"] = position
+    references["velocity"] = velocity
+    return references
+
+
+@njit
+def distance(reference: Any, time: float, state: Any) -> float:
+    """Return how far the state's place is from the reference's at a time [s] [m].
+
+    Between samples the reference is the cubic through places and velocities (Hermite).
+    """
+    k = min(int(time / reference.spacing), SAMPLES - 1)
+    s = time / reference.spacing - k
+    total = 0.0
+    for axis in range(3):
+        p, q = reference.position[k, axis], reference.position[k + 1, axis]
+        u, v = reference.velocity[k, axis] * reference.spacing, reference.velocity[k + 1, axis] * reference.spacing
+        place = p + s * (u + s * (3 * (q - p) - 2 * u - v + s * (2 * (p - q) + u + v)))
+        total += (state.position[axis] - place) ** 2
+    return math.sqrt(total)

@@ -1,0 +1,455 @@
+"""scene + model + scheme + steps → trajectory and verdict. Everything that runs the simulator runs this."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from stiffdice.dynamics import model_selection
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.energy import energies, mechanical
+from stiffdice.dynamics.models.registry import MODELS
+from stiffdice.dynamics.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
+from stiffdice.errors import InputError
+from stiffdice.integrators import registry as schemes
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import backend, batch_loop, fast_forward, monitor
+from stiffdice.simulation.criteria import judge
+from stiffdice.simulation.criteria.apex import default_hop_height
+from stiffdice.simulation.criteria.energy import ceiling, finish
+from stiffdice.simulation.criteria.registry import MEMORY, limits_of, open_of, tolerances_of, values
+from stiffdice.simulation.criteria.registry import observe as criteria_observe
+from stiffdice.simulation.criteria.registry import start as criteria_start
+from stiffdice.simulation.endings import endings_of
+from stiffdice.simulation.monitor import SIGHT
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.reference import none
+
+# Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
+# of a second.
+_WORK = 200_000
+
+LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Every K-th state of one run.
+
+    All arrays have shape (time,). step: how many steps were done. time [s]: since the launch. state: records of
+    position [m], velocity [m/s], angular_momentum [kg m²/s], angular_velocity [rad/s] and node_offset [m], shape (3,),
+    the last (8, 3). kinetic_energy [J]: of translation and rotation. potential_energy [J]: m g z of the centre.
+    elastic_energy [J]: in the ground's springs. mechanical_energy [J]: all three with the velocity at the time of the
+    place; None where the force is an engine's own.
+    """
+
+    step: npt.NDArray[np.int64]
+    time: Array
+    state: States
+    kinetic_energy: Array
+    potential_energy: Array
+    elastic_energy: Array
+    mechanical_energy: Array | None
+
+    @property
+    def energy_paper(self) -> Array:
+        """Kinetic and potential energy as the listings add them [J]."""
+        with np.errstate(invalid="ignore"):  # inf − inf, where a run blew up
+            return self.kinetic_energy + self.potential_energy
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, or an ensemble of them.
+
+    scene: the problem. model: the one computed. model_reason: why, where `auto` was asked. simulator: what made the
+    run. simulator_version: its name and version. scheme: of the time steps. steps: their number to the scene's
+    duration. tolerance [1]: of the error, for a scheme that controls its own. tolerances [1]: by criterion, of those
+    the run was asked. hop_height [m]: below which the criterion apex judges no rebound. measures [1]: values by name,
+    shape (member,). touchdown_phase [1]: of the first touch-down within its step, shape (member,). steps_done: int64
+    (member,), fewer than `steps` where the run was stopped, all being decided, or left the range of doubles. decided:
+    int64 (member, criterion), the step that decided a criterion, in the registry's order; 0 if none did before the end.
+    steps_computed: int64 (member,), those not taken at once. evaluations: int64 (member,), of the force. ending: int8
+    (member,), the `Verdict` whatever the run was asked. verdict: int8 (member,), the `Verdict` by the criteria asked.
+    end: the last states, STATE records of shape (member,), in SI units. trajectory: None if no state was kept.
+    """
+
+    scene: Scene
+    model: str
+    model_reason: str
+    simulator: str
+    simulator_version: str
+    scheme: str
+    steps: int
+    tolerance: float
+    tolerances: dict[str, float]
+    hop_height: float
+    measures: dict[str, Array]
+    touchdown_phase: Array
+    steps_done: npt.NDArray[np.int64]
+    decided: npt.NDArray[np.int64]
+    steps_computed: npt.NDArray[np.int64]
+    evaluations: npt.NDArray[np.int64]
+    ending: npt.NDArray[np.int8]
+    verdict: npt.NDArray[np.int8]
+    end: States
+    trajectory: Trajectory | None
+
+
+def default_every(steps: int) -> int:
+    """Return the K that keeps at most 10,000 samples of a run."""
+    return max(1, math.ceil(steps / 10_000))
+
+
+def simulate(
+    scene: Scene,
+    *,
+    model: str = "tumbling",
+    simulator: str = backend.OURS,
+    scheme: str | None = None,
+    steps: int = 10_000,
+    tolerance: float = schemes.TOLERANCE,
+    every: int | None = None,
+    leap: bool | None = None,
+    members: Ensemble | None = None,
+    criteria: Mapping[str, float] | None = None,
+    stop: Mapping[str, float] | None = None,
+    references: npt.NDArray[np.void] | None = None,
+    hop_height: float | None = None,
+    budget: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Run a scene and return the verdict, the measures and, if asked, the trajectory.
+
+    scene: the problem. model: vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene.
+    simulator: stiffdice, or an engine that is installed (docs/peers.md), which takes every step, one member after
+    another. scheme: None takes symplectic_euler, or an engine's own. steps: number of time steps to the scene's
+    duration. tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are then
+    the intervals after which a state is known. every: keep every K-th state, from the launch on; None keeps none.
+    leap: take many steps at once where their motion is known, which agrees with stepping as listed to round-off; None
+    does so where no state is kept. members: the launches of an ensemble; None runs the scene's own launch. criteria
+    [1]: tolerances of those that the verdict asks, by name; None asks the default ones. stop [1]: end a run as soon as
+    all of these criteria are decided at these tolerances. references: what the criterion trajectory compares with, one
+    for all or one for each member (`reference.make`). hop_height [m]: rebounds that stay lower are not judged by the
+    criterion apex; None takes a tenth of the cube's radius. budget: most steps to compute one by one, or about the most
+    force evaluations of a scheme or an engine that takes its own steps; a run that needs more ends undecided; None is
+    all steps, or 10⁷ evaluations. progress: called with the fraction done, some times a second.
+
+    Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
+    engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.
+    """
+    scheme = backend.scheme_of(simulator, scheme)
+    steps = validation.count("steps", steps)
+    if model == model_selection.AUTO and members is not None:
+        raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
+    model, model_reason = model_selection.chosen(model, [scene], scene.duration / steps)
+    backend.check_fit(simulator, scheme, scene, model)
+    tolerance = _checked_tolerance(tolerance)
+    tolerances = tolerances_of(model, criteria)
+    hop = (
+        default_hop_height(scene)
+        if hop_height is None
+        else validation.number("hop_height", hop_height, "m", at_least=0)
+    )
+    own = Ensemble(start_of(scene, model), np.zeros(1))
+    launches, late = own if members is None else members
+    ensemble = launches.copy()
+    count = len(ensemble)
+    if every is not None:
+        every = validation.count("every", every, at_most=steps)
+        if count != 1:
+            raise InputError("every: a trajectory is kept of one run, not of an ensemble")
+    samples = _room_for(steps, every)
+    physics = physics_of(scene)
+    h = scene.duration / steps
+    most = backend.budget_of(simulator, scheme, steps) if budget is None else budget
+    watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64))
+    watched.memory["limits"] = limits_of({} if stop is None else stop)
+    if every is not None:
+        samples[0] = ensemble[0]
+    lag = backend.lag_of(simulator, scheme)
+    tags = MODELS[model], LAWS[scene.ground.contact]
+    _begin(*tags, physics, ensemble, watched.memory, watched.sight, h, steps, late, lag, hop)
+    compared = none() if references is None else references
+
+    leaping = True if leap or (leap is None and every is None) else None
+
+    def advance() -> bool:
+        goes_on: bool = _march(
+            schemes.SCHEMES[scheme],
+            *tags,
+            physics,
+            ensemble,
+            *watched,
+            compared,
+            steps,
+            h,
+            tolerance,
+            most,
+            every or 0,
+            leaping,
+            samples,
+        )
+        return goes_on
+
+    if simulator != backend.OURS:
+        limits = steps, h, tolerance, most, every or 0
+        backend.driving().march(
+            simulator, scene, model, physics, ensemble, watched, compared, *limits, samples, progress
+        )
+    else:
+        alone = every is not None or progress is not None or budget is not None or references is not None
+        left = count
+        grounded = bool(watched.sight["touched"].any())
+        if leaping and not (alone or grounded) and batch_loop.pays(scene, model, scheme, ensemble):
+            left = batch_loop.march(scene, model, physics, ensemble, watched, steps)
+        if left > 0:
+            _repeat(advance, None if progress is None else lambda: progress(watched.fraction(steps, h)))
+
+    _finish(physics, ensemble, watched.memory, watched.sight)
+    found = values(watched.memory)
+    spent = (watched.steps_done < steps) & (watched.spent >= most)
+    method = scheme if simulator == backend.OURS else None
+    endings = endings_of(scene, model, method, steps, launches, ensemble, watched.memory, watched.sight)
+    ended = judge.ending(found, endings | {Verdict.UNDECIDED: spent})
+    return Run(
+        scene,
+        model,
+        model_reason,
+        simulator,
+        backend.version_of(simulator),
+        scheme,
+        steps,
+        tolerance,
+        tolerances,
+        hop,
+        found,
+        watched.sight["touchdown_phase"].copy(),
+        watched.steps_done,
+        watched.memory["decided"].copy(),
+        watched.steps_computed,
+        watched.evaluations,
+        ended,
+        judge.judge(tolerances, found, ended),
+        ensemble,
+        None
+        if every is None
+        else _trajectory(scene, model, simulator, lag, physics, samples, every, steps, int(watched.steps_done[0])),
+    )
+
+
+def _checked_tolerance(tolerance: float) -> float:
+    number = validation.number("tolerance", tolerance, "1", above=0)
+    if not schemes.FINEST <= number <= schemes.COARSEST:
+        raise InputError(f"tolerance = {number:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}")
+    return number
+
+
+def _repeat(advance: Callable[[], bool], tell: Callable[[], None] | None) -> None:
+    """Advance as long as there is more to do; here, between two calls of compiled code, Python sees signals."""
+    goes_on = True
+    while goes_on:
+        goes_on = advance()
+        if tell is not None:
+            tell()
+
+
+class Watched(NamedTuple):
+    """What a kernel keeps of each member besides its state; first dimension member."""
+
+    memory: npt.NDArray[np.void]
+    sight: npt.NDArray[np.void]
+    steps_done: npt.NDArray[np.int64]
+    steps_computed: npt.NDArray[np.int64]
+    evaluations: npt.NDArray[np.int64]
+
+    @property
+    def spent(self) -> Array:
+        """What each member has taken of its budget: steps computed, or the work of a scheme that takes its own."""
+        return np.maximum(self.steps_computed, self.sight["work"])
+
+    def fraction(self, steps: int, h: float) -> float:
+        """Return the part done of a run of so many steps of h [s], the mean over the members."""
+        pending = self.sight["pending"]
+        begun = np.where(pending > 0, 1 - pending / h, 0.0)
+        return float(np.mean((self.steps_done + begun) / steps))
+
+
+def _room_for(steps: int, every: int | None) -> States:
+    count = 0 if every is None else steps // every + 1
+    if count > LARGEST_TRAJECTORY:
+        raise InputError(
+            f"every = {every}: would keep {count} samples ({count * STATE.itemsize / 1e9:.1f} GB); "
+            f"allowed is {math.ceil(steps / LARGEST_TRAJECTORY)} or more"
+        )
+    return np.zeros(count, STATE)
+
+
+@njit(cache=True)
+def _begin(
+    model: Any,
+    law: Any,
+    physics: Physics,
+    ensemble: States,
+    memory: npt.NDArray[np.void],
+    sight: npt.NDArray[np.void],
+    h: float,
+    steps: int,
+    late: Array,
+    lag: float,
+    hop_height: float,
+) -> None:
+    """Let everything that watches a run look at its launch."""
+    for m in range(ensemble.shape[0]):
+        monitor.start(sight[m], physics, ensemble[m], h, late[m], lag, hop_height)
+        sight[m].steps = steps
+        criteria_start(memory[m], sight[m], model, law, physics, ensemble[m])
+
+
+@njit(cache=True)
+def _finish(physics: Physics, ensemble: States, memory: npt.NDArray[np.void], sight: npt.NDArray[np.void]) -> None:
+    """Let the energy look at the last state of each run."""
+    for m in range(ensemble.shape[0]):
+        finish(memory[m].energy, sight[m], physics, ensemble[m])
+
+
+@njit(cache=True)
+def _march(
+    scheme: Any,
+    model: Any,
+    law: Any,
+    physics: Physics,
+    ensemble: States,
+    memory: npt.NDArray[np.void],
+    sight: npt.NDArray[np.void],
+    steps_done: npt.NDArray[np.int64],
+    steps_computed: npt.NDArray[np.int64],
+    evaluations: npt.NDArray[np.int64],
+    references: npt.NDArray[np.void],
+    steps: int,
+    h: float,
+    tolerance: float,
+    budget: int,
+    every: int,
+    leap: Any,
+    samples: States,
+) -> bool:
+    """Advance one member after another, watching each step and keeping every K-th; return whether there is more to do.
+
+    It ends after _WORK, so that Python can see a signal; where it ends changes nothing. leap: whether motion that is
+    known is taken at once, up to the next sample; None if not, which leaves all of that out of what is compiled.
+    """
+    work = 0.0
+    for m in range(ensemble.shape[0]):
+        state, seen, remembered = ensemble[m], sight[m], memory[m]
+        reference = references[m % references.shape[0]]
+        undecided = open_of(remembered)
+        done = steps_done[m]
+        kept = (done // every + 1) * every if every > 0 else -1  # the step to keep next
+        while done < steps and undecided > 0 and remembered.finite[0] == 0.0:
+            if work >= _WORK:
+                steps_done[m] = done
+                return True
+            before = seen.work
+            left = budget - max(steps_computed[m], int(before))
+            if leap is not None and seen.pending == 0.0:
+                most = min(kept, steps) - done if every > 0 else steps - done
+                taken, flown, computed, evaluated = _leap(
+                    scheme, model, law, physics, state, seen, remembered, reference, most, left, tolerance
+                )
+            elif left > 0:
+                taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+                flown, computed = 0, taken
+            else:
+                break
+            work += 1 + max(evaluated, seen.work - before)
+            steps_computed[m] += computed
+            evaluations[m] += evaluated
+            if seen.pending > 0.0:
+                continue
+            if taken == 0:
+                break
+            step = done + taken
+            monitor.observe(seen, physics, state, step, flown)
+            undecided -= criteria_observe(remembered, step, seen, model, law, physics, state, reference)
+            if remembered.finite[0] > 0.0:
+                done = step - 1 if computed > 0 else done
+                break
+            done = step
+            if done == kept:
+                samples[step // every] = state
+                kept += every
+        steps_done[m] = done
+    return False
+
+
+@njit
+def _leap(
+    scheme: Any,
+    model: Any,
+    law: Any,
+    physics: Physics,
+    state: Any,
+    seen: Any,
+    remembered: Any,
+    reference: Any,
+    most: int,
+    left: int,
+    tolerance: float,
+) -> tuple[int, int, int, int]:
+    """Take steps up to the next that must be seen; return how many, in free flight, computed, and force evaluations.
+
+    most: steps at most. left: those that may be computed; where that is none and no other is known, none is taken.
+    """
+    compared = reference.horizon >= seen.time
+    if compared:  # at least as often as the reference is known
+        most = min(most, 1 + int(reference.spacing / seen.step_size))
+    flown = fast_forward.free_steps(model, law, physics, state, seen, most)
+    if flown > 0:
+        schemes.flight(scheme, model, physics, state, seen.step_size, flown)
+        return flown, flown, 0, 0
+    if left <= 0:
+        return 0, 0, 0, 0
+    held = seen.held
+    skipped = fast_forward.skip(scheme, model, law, physics, state, seen, most)
+    most = min(most - skipped, left)
+    # Every step counts where the motion is compared, known by phases, has just come to rest, or goes on without ever
+    # having left the ground.
+    if (
+        compared
+        or (remembered.energy[3] > 0.0 and seen.still == 0.0)
+        or seen.held > held
+        or fast_forward.follows(scheme, model, physics, state, seen)
+    ):
+        most = 1
+    high, low = ceiling(remembered.energy), fast_forward.rest_of(model, law, physics, seen)
+    taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
+    return skipped + taken, 0, computed, evaluated
+
+
+def _trajectory(
+    scene: Scene,
+    model: str,
+    simulator: str,
+    lag: float,
+    physics: Physics,
+    samples: States,
+    every: int,
+    steps: int,
+    steps_done: int,
+) -> Trajectory:
+    state = samples[: steps_done // every + 1]
+    step = np.arange(len(state), dtype=np.int64) * every
+    whole = None
+    if simulator == backend.OURS:
+        behind = lag * scene.duration / steps
+        whole = mechanical(MODELS[model], LAWS[scene.ground.contact], physics, state, behind)
+    kinetic, potential, elastic = energies(physics, state)
+    return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, whole)

@@ -1,0 +1,480 @@
+"""A study: one sweep with its question, one YAML file. What it asks for, checked, and which cells answer it."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stiffdice.dynamics import model_selection
+from stiffdice.dynamics.state import TURNING, start_of
+from stiffdice.errors import InputError, NotInstalledError, printable
+from stiffdice.integrators import registry as schemes
+from stiffdice.io import yaml_loader
+from stiffdice.scene import scene as scenes
+from stiffdice.scene import validation
+from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.simulation import backend
+from stiffdice.simulation.criteria.registry import tolerances_of
+from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.initial_conditions import phased, turned
+from stiffdice.study import catalogue
+from stiffdice.sweep.grid import Spans, Sweep
+
+# In units of the side: nodes that are this level land at once, as far as their restitution shows.
+_FLAT = 1e-9
+
+
+class PlannedRun(NamedTuple):
+    """One scene to be run, once for each reading of the paper's physics.
+
+    A tuple, as PlannedFigure: Snakemake notices a changed parameter only if it is plain data.
+    """
+
+    scene: str
+    presets: tuple[str, ...]
+    model: str
+    simulator: str
+    scheme: str
+    steps: int
+    every: int
+
+
+class Experiment(NamedTuple):
+    """One question that is no sweep, or one timing: what to measure (a name in the catalogue), of what scene, how."""
+
+    measure: str
+    scene: str
+    changes: tuple[str, ...]
+    options: dict[str, Any]
+
+
+class PlannedFigure(NamedTuple):
+    """One figure: what to draw (a name in the catalogue), of which run, or of which sweeps, experiments or timings.
+
+    timings: those shown besides experiments.
+    """
+
+    draw: str
+    run: str | None
+    of: tuple[str, ...]
+    title: str
+    timings: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """Return what Snakemake's report shows of it: inside a script element, which a `</script>` in it would end."""
+        return repr(self).replace("<", r"\x3c")
+
+    @property
+    def caption(self) -> str:
+        """The title for a caption in reStructuredText, in which it has no markup."""
+        return re.sub(r"([^a-zA-Z0-9\s])", r"\\\1", printable(" ".join(self.title.split())))
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything one YAML file in config/ asks for, and what of it is left out: a line for each, and why.
+
+    Left out is what needs an engine that is not installed: runs, sweeps, methods of experiments and timings, and what
+    is drawn or told of these alone.
+    """
+
+    name: str
+    question: str
+    runs: Mapping[str, PlannedRun]
+    sweeps: Mapping[str, Sweep]
+    experiments: Mapping[str, Experiment]
+    timings: Mapping[str, Experiment]
+    figures: Mapping[str, PlannedFigure]
+    tables: Mapping[str, PlannedFigure]
+    dpi: int
+    left_out: tuple[str, ...] = ()
+
+
+NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]*")
+
+
+def load(path: str | Path, schema: str | Path) -> Study:
+    """Return the study in a YAML file, checked against the JSON schema in another and with its scenes read.
+
+    Raises InputError naming the file, the key, the value and what is allowed.
+    """
+    if not NAME.fullmatch(Path(path).stem):
+        raise InputError(f"{path}: allowed in a study's name are letters, digits, hyphens and underscores")
+    if not Path(path).exists():
+        raise InputError(_missing(Path(path)))
+    data = yaml_loader.load(path)
+    _validate(data, schema, str(path))
+    try:
+        tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
+        left_out: list[str] = []
+        parts = {
+            "runs": _installed(data, "runs", _planned_run, left_out),
+            "sweeps": _installed(data, "sweeps", partial(_sweep, criteria=data.get("criteria")), left_out),
+            "experiments": _installed(data, "experiments", partial(_experiment, "experiments", left_out), left_out),
+            "timings": _installed(data, "timings", partial(_experiment, "timings", left_out), left_out),
+        }
+        figures = {
+            name: _planned_figure(name, part, data, parts["runs"]) for name, part in data.get("figures", {}).items()
+        }
+        tables = {name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()}
+        return Study(
+            name=Path(path).stem,
+            question=data["question"],
+            **parts,
+            figures=_shown("figures", figures, catalogue.DRAWINGS, parts, left_out),
+            tables=_shown("tables", tables, catalogue.TABLES, parts, left_out),
+            dpi=int(data.get("dpi", 150)),
+            left_out=tuple(left_out),
+        )
+    except InputError as error:
+        raise error.within(str(path)) from None
+
+
+def _missing(path: Path) -> str:
+    """Return what to say of a study that is not there: those that are, and which was meant if one is near."""
+    there = sorted(other.stem for other in path.parent.glob("*.yaml") if NAME.fullmatch(other.stem))
+    told = f"those in {path.parent}/ are {', '.join(there)}" if there else f"{path.parent}/ has none"
+    return f"{path}: there is no study {path.stem}; {told}{validation.meant(path.stem, there)}"
+
+
+def _installed(
+    data: Mapping[str, Any], kind: str, plan: Callable[[str, Any], Any], left_out: list[str]
+) -> dict[str, Any]:
+    """Return the parts of one kind that a study names, planned, without those that need what is not installed."""
+    planned = {}
+    for name, part in data.get(kind, {}).items():
+        try:
+            planned[name] = plan(name, part)
+        except NotInstalledError as error:
+            left_out.append(f"left out: {error}")
+    return planned
+
+
+def _shown(
+    kind: str,
+    planned: Mapping[str, PlannedFigure],
+    entries: Mapping[str, catalogue.Entry],
+    parts: Mapping[str, Mapping[str, Any]],
+    left_out: list[str],
+) -> dict[str, PlannedFigure]:
+    """Return figures or tables of what there is, without those that would have nothing to show."""
+    shown = {}
+    for name, part in planned.items():
+        sources = (part.run,) if part.run is not None else part.of
+        there = tuple(source for source in sources if source in parts[entries[part.draw].given])
+        timings = tuple(source for source in part.timings if source in parts["timings"])
+        if there and bool(timings) == bool(part.timings):
+            shown[name] = part._replace(of=() if part.run is not None else there, timings=timings)
+        else:
+            left_out.append(f"left out: {kind}.{name}: nothing of what it shows is there")
+    return shown
+
+
+def _validate(data: object, schema: str | Path, source: str) -> None:
+    import jsonschema
+
+    _refuse_nan(data, "", source)
+    validator = jsonschema.Draft202012Validator(_filled(yaml_loader.load(schema)))
+    errors = sorted(validator.iter_errors(data), key=_rank)
+    if errors:
+        raise InputError(f"{source}: {_told(_innermost(errors[0]))}")
+
+
+def _filled(schema: Any) -> Any:
+    """Return a study's schema with the names that its file leaves to the code."""
+    known = {
+        "model": model_selection.CHOICES,
+        "scheme": schemes.SCHEMES,
+        "simulator": (backend.OURS, *engines.ENGINES),
+        "contact_law": CONTACT_LAWS,
+    }
+    for kind, names in known.items():
+        schema["$defs"][kind] = {"enum": list(names), "errorMessage": f"allowed is {' or '.join(names)}"}
+    return schema
+
+
+def _refuse_nan(data: object, where: str, source: str) -> None:
+    """Raise InputError if a number is not one: no bound of a schema stops a NaN."""
+    if isinstance(data, float) and math.isnan(data):
+        raise InputError(f"{source}: {where[1:]} = nan: allowed is a finite number")
+    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, part in parts:
+        _refuse_nan(part, f"{where}.{key}", source)
+
+
+# A misspelt key is told before the key that it leaves missing.
+_RANK = {"additionalProperties": 0, "required": 2, "oneOf": 3}
+
+
+def _rank(error: Any) -> int:
+    return _RANK.get(str(error.validator), 1)
+
+
+def _innermost(error: Any) -> Any:
+    """Return what is wrong within a value that may be of several kinds, if it is of one of them."""
+    if error.validator != "anyOf":
+        return error
+    others = {part.relative_schema_path[0] for part in error.context if part.validator == "type" and not part.path}
+    for part in sorted(error.context, key=_rank):
+        inner = _innermost(part)
+        if part.relative_schema_path[0] not in others and inner.validator != "anyOf":
+            return inner
+    return error
+
+
+def _told(error: Any) -> str:
+    """Return a schema error as one line that names the key, its value and what is allowed."""
+    where = ".".join(str(part) for part in error.absolute_path)
+    try:
+        if error.validator == "additionalProperties":
+            validation.known_keys(where, error.instance, list(error.schema["properties"]))
+    except InputError as unknown:
+        return str(unknown)
+    if error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        return f"{where + '.' if where else ''}{missing[0]} is missing"
+    allowed = error.schema.get("errorMessage")
+    if error.validator == "enum" and allowed:
+        allowed += validation.meant(error.instance, error.validator_value)
+    if error.validator == "oneOf":
+        return f"{where}: {allowed}"
+    if "propertyNames" in error.absolute_schema_path:
+        return f"{where}.{error.instance}: allowed names have small letters, digits and hyphens"
+    return f"{where or 'the file'} = {validation.shown(error.instance)}: {allowed or error.message}"
+
+
+def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
+    steps, every, simulator = int(run["steps"]), int(run.get("every", 1)), run.get("simulator", backend.OURS)
+    if every > steps:
+        raise InputError(f"runs.{name}.every = {every}: allowed is a whole number <= steps = {steps}")
+    try:
+        planned = PlannedRun(
+            run["scene"],
+            tuple(run.get("presets", ("as_listed", "as_written"))),
+            run["model"],
+            simulator,
+            backend.scheme_of(simulator, run.get("scheme")),
+            steps,
+            every,
+        )
+        _models_of(planned)
+    except InputError as error:
+        raise error.within(f"runs.{name}") from None
+    return planned
+
+
+def _models_of(run: PlannedRun) -> set[str]:
+    """Return the models that a run computes, one for each preset; raises InputError if one cannot be started."""
+    models = set()
+    for preset in run.presets:
+        scene = scenes.load(run.scene, preset=preset)
+        model, _ = model_selection.chosen(run.model, [scene], scene.duration / run.steps)
+        backend.check_fit(run.simulator, run.scheme, scene, model)
+        start_of(scene, model)
+        models.add(model)
+    return models
+
+
+def _planned_figure(
+    name: str, figure: Mapping[str, Any], data: Mapping[str, Any], runs: Mapping[str, PlannedRun]
+) -> PlannedFigure:
+    planned = PlannedFigure(
+        figure["draw"],
+        figure.get("run"),
+        tuple(figure.get("of", ())),
+        figure["title"],
+        tuple(figure.get("timings", ())),
+    )
+    validation.choice(f"figures.{name}.draw", planned.draw, catalogue.DRAWINGS)
+    drawing = catalogue.DRAWINGS[planned.draw]
+    if drawing.given != "runs":
+        if planned.run is not None:
+            raise InputError(
+                f"figures.{name}.run = {planned.run}: {planned.draw} draws {drawing.given}; name them with `of`"
+            )
+        return _checked_sources(f"figures.{name}", planned, drawing, data)
+    if planned.of or planned.timings:
+        raise InputError(
+            f"figures.{name}.{'of' if planned.of else 'timings'}: {planned.draw} draws a run; name it with `run`"
+        )
+    run = runs.get(_known(f"figures.{name}.run", planned.run, data.get("runs", {}), "runs"))
+    if run and planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
+        raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
+    return planned
+
+
+def _planned_table(name: str, table: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
+    planned = PlannedFigure(table["tell"], None, tuple(table["of"]), table["title"], tuple(table.get("timings", ())))
+    validation.choice(f"tables.{name}.tell", planned.draw, catalogue.TABLES)
+    return _checked_sources(f"tables.{name}", planned, catalogue.TABLES[planned.draw], data)
+
+
+def _checked_sources(
+    where: str, planned: PlannedFigure, entry: catalogue.Entry, data: Mapping[str, Any]
+) -> PlannedFigure:
+    """Return the plan; raises InputError unless it names sweeps, experiments or timings that the study has."""
+    if not planned.of:
+        raise InputError(f"{where}.of is missing: {planned.draw} needs the names of {entry.given}")
+    if planned.timings and not entry.timed:
+        raise InputError(f"{where}.timings: {planned.draw} shows none")
+    for key, kind, names in (("of", entry.given, planned.of), ("timings", "timings", planned.timings)):
+        for source in names:
+            _known(f"{where}.{key}", source, data.get(kind, {}), kind)
+            if entry.measures and data[kind][source]["measure"] != entry.measures:
+                raise InputError(
+                    f"{where}.{key} = {source}: {planned.draw} shows only {kind} that measure {entry.measures}"
+                )
+    return planned
+
+
+def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> str:
+    """Return a name if there is one such thing in the study; raises InputError otherwise."""
+    if name is None or name not in names:
+        allowed = " or ".join(names) or f"none: this study has no {kind}"
+        raise InputError(f"{where} = {validation.shown(name)}: allowed is {allowed}{validation.meant(name, names)}")
+    return name
+
+
+def _experiment(kind: str, left_out: list[str], name: str, experiment: Mapping[str, Any]) -> Experiment:
+    """Return the plan, its methods without those that are not installed."""
+    registry = {"experiments": catalogue.EXPERIMENTS, "timings": catalogue.TIMINGS}[kind]
+    planned = Experiment(
+        experiment["measure"],
+        experiment["scene"],
+        tuple(experiment.get("set", ())),
+        dict(experiment.get("options", {})),
+    )
+    try:
+        validation.choice("measure", planned.measure, registry)
+        scene = scenes.load(planned.scene, planned.changes)
+        _refuse_restitution(scene, f"{kind} may take others")
+        parameters = inspect.signature(registry[planned.measure].load()).parameters.values()
+        known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
+        validation.known_keys("options", planned.options, known)
+        for key, value in planned.options.items():
+            _same_kind(f"options.{key}", value, known[key])
+        if "methods" in planned.options:
+            planned.options["methods"] = _installed_of(planned.options["methods"], f"{kind}.{name}", left_out)
+    except InputError as error:
+        raise error.within(f"{kind}.{name}") from None
+    return planned
+
+
+def _installed_of(methods: Sequence[str], where: str, left_out: list[str]) -> list[str]:
+    """Return the methods without engines that are not installed; raises NotInstalledError if none is left."""
+    found, last = [], None
+    for method in methods:
+        try:
+            if method in engines.ENGINES:
+                engines.adapter_of(method, "methods")
+            found.append(method)
+        except NotInstalledError as error:
+            last = error
+            left_out.append(f"left out: {error.within(where)}")
+    if last is not None and not found:
+        raise NotInstalledError("methods: none of them is left")
+    return found
+
+
+def _same_kind(key: str, value: object, default: Any) -> None:
+    """Raise InputError unless an option's value is of the kind that its default is."""
+    if isinstance(default, str):
+        if not isinstance(value, str):
+            raise InputError(f"{key} = {validation.shown(value)}: allowed is a word, as {default}")
+    elif isinstance(default, int):
+        validation.count(key, value)
+    elif isinstance(default, float):
+        validation.number(key, value, "", at_least=0)
+    else:
+        words = isinstance(default, tuple) and isinstance(default[0], str)
+        if not isinstance(value, list) or not value or (words and not all(isinstance(part, str) for part in value)):
+            kind = f"words, as {default[0]}" if words else "numbers"
+            raise InputError(f"{key} = {validation.shown(value)}: allowed is a list of {kind}")
+        for part in [] if words else value:
+            validation.number(key, part, "", at_least=0)
+
+
+def _sweep(name: str, sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
+    try:
+        return _checked_sweep(sweep, sweep.get("criteria", criteria))
+    except InputError as error:
+        raise error.within(f"sweeps.{name}") from None
+
+
+def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
+    scene = scenes.load(sweep["scene"], sweep.get("set", ()))
+    stiffness, simulator = sweep["stiffness"], sweep.get("simulator", backend.OURS)
+    asked = Sweep(
+        scene,
+        sweep["model"],
+        backend.scheme_of(simulator, sweep.get("scheme")),
+        tuple(sweep["contact"]),
+        {"from": stiffness, "to": stiffness, "count": 1} if isinstance(stiffness, int | float) else stiffness,
+        sweep.get("steps"),
+        sweep.get("omega_h"),
+        int(sweep["members"]),
+        int(sweep.get("seed", 0)),
+        int(sweep.get("refine", 0)),
+        {},
+        bool(sweep.get("early_stop", True)),
+        float(sweep.get("horizon", scene.duration)),
+        sweep.get("seconds_per_job"),
+        simulator=simulator,
+        reach=sweep.get("reach"),
+        hop_height=sweep.get("hop_height"),
+    )
+    model, reason = _model_of(asked)
+    planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))
+    for column in planned.columns():
+        backend.check_fit(simulator, planned.scheme, planned.scene_of(column), model)
+    if not planned.criteria:
+        raise InputError(f"criteria: none of them means anything for model {planned.model}")
+    if planned.horizon > scene.duration:
+        raise InputError(f"horizon = {planned.horizon:g}: allowed is a number <= duration = {scene.duration:g} [s]")
+    _refuse_descending(planned.stiffness)
+    if any(column != (scene.ground.contact, scene.ground.stiffness) for column in planned.columns()):
+        _refuse_restitution(scene, "the sweep sets others")
+    for key in ("stiffness", "contact"):
+        for override in sweep.get("set", ()):
+            if override.split("=")[0].strip() in ("ground", f"ground.{key}"):
+                raise InputError(f"set: {override}: the sweep sets this itself, from its key {key}")
+    if "restitution" in planned.criteria and not model_selection.lands_flat(scene, _FLAT):
+        raise InputError("criteria.restitution: is known exactly for flat landings only, and this cube lands tilted")
+    most = max(planned.step_range(column.stiffness)[1] for column in planned.columns())
+    if not most <= validation.LARGEST_COUNT:
+        key = "steps" if planned.steps else "omega_h"
+        raise InputError(f"{key}: asks for up to {most:.3g} steps; allowed are {validation.LARGEST_COUNT}")
+    longest = min((planned.scan(column)[0], column) for column in planned.columns())
+    launches = turned(scene, planned.model, planned.members)
+    phased(planned.scene_of(longest[1]), planned.model, longest[0], planned.members, launches)
+    return planned
+
+
+def _refuse_restitution(scene: scenes.Scene, reason: str) -> None:
+    """Raise InputError if the damping of a scene's ground follows from its restitution."""
+    if any(line.startswith("ground.damping") for line in scene.derived):
+        raise InputError(
+            f"scene: its ground.restitution is that of stiffness {scene.ground.stiffness:g} kg/s² and the "
+            f"{scene.ground.contact} law alone, and {reason}; give ground.damping"
+        )
+
+
+def _refuse_descending(stiffness: Spans) -> None:
+    for span in [stiffness] if isinstance(stiffness, Mapping) else stiffness:
+        if span["from"] > span["to"]:
+            raise InputError(f"stiffness.from = {span['from']:g}: allowed is a number <= to = {span['to']:g} [kg/s²]")
+
+
+def _model_of(sweep: Sweep) -> tuple[str, str]:
+    """Return the model of a sweep, one for all its columns, and why."""
+    columns = sweep.columns()
+    fewest = min(sweep.step_range(column.stiffness)[0] for column in columns)
+    longest_step = sweep.scene.duration / max(1.0, fewest)
+    return model_selection.chosen(sweep.model, map(sweep.scene_of, columns), longest_step)

@@ -1,0 +1,138 @@
+"""About how long the jobs of a study take, told before any of them has run.
+
+Seconds are of one core of the machine that `cost` is of, otherwise idle; how this one compares, a sum of numbers in a
+row says within a hundredth of a second (`slowness`), and what else runs on it, the system (`crowding`). What `cost`
+does not predict takes as long as was measured once: a table, right as long as the options are as in config/. How good
+it is: `docs/status.md`.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from stiffdice.study import outputs
+from stiffdice.study.catalogue import DRAWINGS
+from stiffdice.study.config import Experiment, Study
+from stiffdice.study.outputs import Result
+from stiffdice.sweep import partition as shards
+
+# Of a job, besides what it simulates: Python, what it imports, compiled code that it loads, files, drawing.
+_JOB = {
+    **{"trajectory": 1.2, "experiment": 1.0, "timings": 1.0, "shard": 1.2, "survey": 1.1, "collect": 1.2},
+    **{"frontier": 1.0, "figure": 1.3, "animation": 9.0, "table": 1.0},
+}
+_DRAWING = 1.0  # more than that, of a figure that shows more than a run
+_STARTING = 0.12  # of Snakemake, to choose and start a job
+
+# Of an experiment and of a timing: by the axis or problem that its options name, or else by its measure.
+_EXPERIMENT = {
+    **{
+        "bounce-map": 2.4,
+        "apex-edge": 32.0,
+        "held-contacts": 16.0,
+        "rocking": 1.3,
+        "energy-budget": 0.8,
+        "failure-map": 1.0,
+        "friction-chatter": 0.8,
+        "precision-limits": 1.2,
+    },
+    **{"model-ablation": 5.0, "work-precision": 33.0, "engine-contact": 2.0, "engine-limits": 2.6, "engine-throw": 6.5},
+    **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},
+    **{"flat-bounce": 25.0, "sliding-bounce": 21.0, "tumbling-throw": 75.0},
+}
+_TIMING = {
+    **{"work-precision": 3.0, "model-ablation": 1.2, "engine-speed": 3.2},
+    **{"flat-bounce": 24.0, "sliding-bounce": 17.0, "tumbling-throw": 34.0},
+}
+
+# A later round has that part of the work by which its shards are counted (`shards`), which is a generous guess.
+_LATER = 0.25
+
+# Where nothing is compiled yet, the first job of a kind compiles: of runs for each model and contact law, of sweeps for
+# each law, and of all else once.
+_COMPILING = {"trajectory": 4.0, "shard": 9.0, "experiment": 5.0, "timings": 5.0}
+
+# What takes `_SUM` seconds on the machine of `cost`: that many numbers added, each waiting for the one before.
+_NUMBERS, _SUM = np.ones(4096), 1.27e-5
+_LOOK = 0.01
+
+
+def seconds(study: Study) -> dict[Result, float]:
+    """Return how long the job of each result of a study takes [s], on a core of the machine that `cost` is of."""
+    sweeps = study.sweeps.items()
+    plans = {f"{name}/{shard}": plan for name, sweep in sweeps for shard, plan in shards.of(sweep).items()}
+    found, compiled = dict[Result, float](), _is_compiled()
+    kinds = set[tuple[str, ...]]()
+    for result in outputs.of(study):
+        found[result] = _JOB[result.stage] + _STARTING + _work(study, result, plans)
+        kind = _compiled_for(study, result)
+        if kind and kind not in kinds and not compiled:
+            kinds.add(kind)
+            found[result] += _COMPILING[result.stage] * (len(kind) - 2 if result.stage == "shard" else 1)
+    return found
+
+
+def _work(study: Study, result: Result, plans: dict[str, shards.Shard]) -> float:
+    """Return the seconds of a job beyond its start."""
+    match result.stage:
+        case "shard":
+            plan = plans[result.name]
+            return plan.seconds * (_LATER if plan.round else 1.0)
+        case "experiment":
+            return _measuring(study.experiments[result.name], _EXPERIMENT)
+        case "timings":
+            return _measuring(study.timings[result.name], _TIMING)
+        case "figure":
+            return 0.0 if DRAWINGS[study.figures[result.name].draw].given == "runs" else _DRAWING
+    return 0.0
+
+
+def _measuring(planned: Experiment, table: dict[str, float]) -> float:
+    choice = planned.options.get("axis", planned.options.get("problem"))
+    return table.get(str(choice), table.get(planned.measure, 0.0))
+
+
+def _compiled_for(study: Study, result: Result) -> tuple[str, ...]:
+    """Return what compiled code of a job's kind is compiled for, stage and model first; empty if it has none."""
+    name, _, preset = result.name.partition("." if result.stage == "trajectory" else "/")
+    match result.stage:
+        case "trajectory":
+            return "trajectory", study.runs[name].model, preset
+        case "shard":
+            return "shard", study.sweeps[name].model, *study.sweeps[name].contact
+        case "experiment" | "timings":
+            return result.stage, name
+    return ()
+
+
+def _is_compiled() -> bool:
+    """Return whether the kernel of single runs lies in the folder that `compiled` has chosen."""
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
+    return any(folder.glob("*/simulate._march*.nbc"))
+
+
+def slowness() -> float:
+    """Return how many times as long as the machine that `cost` is of this one takes; looks for a hundredth of a second.
+
+    The best of some thousand tries, which other work on the machine does not change.
+    """
+    begun, best = time.perf_counter(), float("inf")
+    while (start := time.perf_counter()) - begun < _LOOK:
+        np.add.accumulate(_NUMBERS)
+        best = min(best, time.perf_counter() - start)
+    return best / _SUM
+
+
+def crowding(cores: int) -> float:
+    """Return how many times as long as alone jobs on so many cores take beside what else runs on this machine now."""
+    try:
+        load, _, _, tasks, *_ = Path("/proc/loadavg").read_text(encoding="ascii").split()
+        # The mean of a minute knows of what has just ended; a moment may be an odd one.
+        others = min(float(load), int(tasks.partition("/")[0]) - 1)
+    except (OSError, ValueError):
+        return 1.0
+    return max(1.0, (others + cores) / max(cores, os.cpu_count() or 1))

@@ -1,0 +1,1 @@
+"""Sweeps: grid, partition into jobs, collection, stability limits."""

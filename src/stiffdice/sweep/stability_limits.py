@@ -1,0 +1,211 @@
+"""Where stability begins: edges of each criterion over the scanned steps, and the power law through them.
+
+Passing is not monotone in the number of steps, so there is no one limit, and bisection would find an arbitrary one.
+What is reported is the scan itself and its two edges.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from stiffdice import __version__
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.code_digest import code_digest
+from stiffdice.io.cf_enums import enum_attributes, meanings_of
+from stiffdice.scene import scene as scenes
+from stiffdice.simulation import dataset
+
+# What a scan has edges of, and what they are.
+EDGES = {
+    "first_pass": "fewest steps at which every member passes",
+    "last_fail": "most steps at which a member still fails",
+    "steps_needed": "fewest scanned steps from which on every member passes",
+}
+
+# A power law through an edge, and how sure it is.
+FIT = {
+    "exponent": "exponent of the power law",
+    "exponent_error": "standard error of it",
+    "factor": "steps at stiffness 1 kg s-2 by the power law",
+    "scatter": "standard deviation of log10 of the steps about the power law",
+    "centre": "geometric mean of the stiffnesses in the fit",
+    "points": "number of stiffnesses in the fit",
+}
+
+Values = npt.NDArray[np.float64]
+
+
+def edges(steps: npt.NDArray[np.int64], passes: npt.NDArray[np.bool_]) -> dict[str, float]:
+    """Return first_pass, last_fail, steps_needed and flips of one scan; NaN where the scan has no such point.
+
+    steps: ascending, shape (scan,). passes: whether all members passed, same shape.
+    """
+    good, bad = np.flatnonzero(passes), np.flatnonzero(~passes)
+    above = bad[-1] + 1 if bad.size else None
+    return {
+        "first_pass": float(steps[good[0]]) if good.size else np.nan,
+        "last_fail": float(steps[bad[-1]]) if bad.size else np.nan,
+        "steps_needed": float(steps[above]) if above is not None and above < len(steps) else np.nan,
+        "flips": float(np.count_nonzero(passes[1:] != passes[:-1])),
+    }
+
+
+def power_law(stiffness: Values, steps: Values) -> dict[str, float]:
+    """Return the power law steps = factor · stiffness^exponent through points, and how sure it is.
+
+    Least squares in the logarithms (base 10), over the points that are there: `exponent` and its standard error,
+    `factor`, `scatter` (standard deviation of the residuals), `centre` (geometric mean of the stiffnesses) and
+    `points`. NaN with fewer than three points.
+    """
+    points = [(math.log10(x), math.log10(y)) for x, y in zip(stiffness, steps, strict=True) if np.isfinite(y)]
+    count = len(points)
+    if count < 3:
+        return dict.fromkeys(FIT, np.nan) | {"points": float(count)}
+    # Sums that are exact, and logarithms one by one: NumPy's own differ in the last digit from processor to processor.
+    centre, middle = (math.fsum(values) / count for values in zip(*points, strict=True))
+    spread = math.fsum((x - centre) ** 2 for x, _ in points)
+    slope = math.fsum((x - centre) * y for x, y in points) / spread
+    scatter = math.sqrt(math.fsum((y - middle - slope * (x - centre)) ** 2 for x, y in points) / (count - 2))
+    return {
+        "exponent": slope,
+        "exponent_error": scatter / math.sqrt(spread),
+        "factor": 10 ** (middle - slope * centre),
+        "scatter": scatter,
+        "centre": 10**centre,
+        "points": float(count),
+    }
+
+
+def band(fit: Mapping[str, float], stiffness: Values) -> tuple[Values, Values]:
+    """Return the steps between which a further edge would lie by two standard errors, shape of `stiffness` each.
+
+    The textbook's prediction band of a regression line: scatter·√(1 + 1/n + (x − x̄)²/Σ(x − x̄)²) in the logarithm. The
+    band of the line itself is narrower, and leaves points out wherever the edges are no exact power law.
+    """
+    away = np.log10(stiffness / fit["centre"])
+    width = 2 * np.sqrt(fit["scatter"] ** 2 * (1 + 1 / fit["points"]) + (fit["exponent_error"] * away) ** 2)
+    middle = np.log10(fit["factor"]) + fit["exponent"] * np.log10(stiffness)
+    return 10 ** (middle - width), 10 ** (middle + width)
+
+
+def confidence(passing: npt.NDArray[np.int64], members: int) -> tuple[Values, Values]:
+    """Return Wilson's 95 % interval of a share of which `passing` of `members` passed, shape of `passing` each.
+
+    Wilson (1927), doi:10.1080/01621459.1927.10502953. It takes members for random draws; ours are spread evenly, so
+    that the interval is rather too wide.
+    """
+    z = 1.959963984540054
+    share = passing / members
+    middle = (share + z * z / (2 * members)) / (1 + z * z / members)
+    width = z * np.sqrt(share * (1 - share) / members + z * z / (4 * members**2)) / (1 + z * z / members)
+    # Round-off must not leave the share itself outside.
+    return np.clip(middle - width, 0.0, share), np.clip(middle + width, share, 1.0)
+
+
+def find(sweep: xr.Dataset) -> xr.Dataset:
+    """Return the frontier of a collected sweep by contact law, criterion and stiffness; and the scan, by cell."""
+    criteria = meanings_of(sweep.criterion)
+    laws, law_of = np.unique(sweep.contact.values, return_inverse=True)
+    stiffnesses, stiffness_of = np.unique(sweep.stiffness.values, return_inverse=True)
+    column = law_of * len(stiffnesses) + stiffness_of
+    by_column = np.argsort(column, kind="stable")
+    ends = np.searchsorted(column[by_column], np.arange(len(laws) * len(stiffnesses) + 1))
+    shape = (len(laws), len(criteria), len(stiffnesses))
+    found = {name: np.full(shape, np.nan) for name in (*EDGES, "flips")}
+    fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in FIT}
+    passes = sweep.failing.values == 0
+    for k in range(len(laws)):
+        for c in range(len(criteria)):
+            inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
+            for s in range(len(stiffnesses)):
+                first = k * len(stiffnesses) + s
+                scan = by_column[ends[first] : ends[first + 1]]
+                row = passes[c, scan]
+                for name, value in edges(sweep.steps.values[scan], row).items():
+                    found[name][k, c, s] = value
+                inside[:, s] = not row[0], row[-1], row[-1]
+            for e, edge in enumerate(EDGES):
+                # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
+                measured = np.where(inside[e], found[edge][k, c], np.nan)
+                for name, value in power_law(stiffnesses, measured).items():
+                    fits[name][k, c, e] = value
+    return _dataset(sweep, laws, stiffnesses, found, fits)
+
+
+def _dataset(
+    sweep: xr.Dataset,
+    laws: npt.NDArray[np.int8],
+    stiffnesses: Values,
+    found: Mapping[str, Values],
+    fits: Mapping[str, Values],
+) -> xr.Dataset:
+    grid = ("contact", "criterion", "stiffness")
+    scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
+    limits = [
+        linear_theory.steps_for(scene.with_ground(stiffness=value), linear_theory.STABILITY_LIMIT)
+        for value in stiffnesses
+    ]
+    members = int(sweep.attrs["members"])
+    passing = members - sweep.failing.values.astype(np.int64)
+    low, high = confidence(passing, members)
+    scan = ("criterion", "cell")
+    described: dict[str, tuple[Any, Any, str]] = {
+        **{name: (grid, found[name], meaning) for name, meaning in EDGES.items()},
+        "flips": (grid, found["flips"], "changes between pass and fail along the scan"),
+        "limit": ("stiffness", limits, "steps at the linear stability limit, omega h = 2"),
+        "pass_fraction": (scan, passing / members, "share of a cell's members that pass the criterion"),
+        "pass_fraction_low": (scan, low, "lower end of its 95 % confidence interval"),
+        "pass_fraction_high": (scan, high, "upper end of its 95 % confidence interval"),
+        "tolerance": ("criterion", sweep.tolerance.values, "tolerance of the criterion"),
+        **{name: ((*grid[:2], "edge"), fits[name], meaning) for name, meaning in FIT.items()},
+    }
+    variables: dict[str, Any] = {
+        name: (dims, values, {"long_name": meaning, "units": "kg s-2" if name == "centre" else "1"})
+        for name, (dims, values, meaning) in described.items()
+    }
+    coordinates: dict[str, Any] = {
+        "contact": ("contact", laws, dataset.CONTACT_ATTRIBUTES),
+        "criterion": ("criterion", sweep.criterion.values, sweep.criterion.attrs),
+        "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum_attributes("edge of a criterion", list(EDGES))),
+        "stiffness": ("stiffness", stiffnesses, dataset.CELL_ATTRIBUTES["stiffness"]),
+    }
+    coordinates |= {
+        f"cell_{name}": ("cell", sweep[name].values, sweep[name].attrs)
+        for name in ("contact", "stiffness", "steps", "omega_h")
+    }
+    attributes = sweep.attrs | {
+        "title": "Edges of stability",
+        "kind": "frontier",
+        "stiffdice_version": __version__,
+        "analysis_code_digest": code_digest("stiffdice.sweep.stability_limits"),
+    }
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def table(frontier: xr.Dataset) -> str:
+    """Return the frontier as CSV: one line for each contact law, criterion and stiffness."""
+    laws = meanings_of(frontier.contact)
+    criteria = meanings_of(frontier.criterion)
+    columns = ("first_pass", "last_fail", "steps_needed", "flips")
+    lines = [
+        "contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,"
+        + ",".join(columns)
+        + ",last_fail_exponent,last_fail_exponent_error"
+    ]
+    edge = meanings_of(frontier.edge).index("last_fail")
+    for k, law in enumerate(frontier.contact.values):
+        for c, criterion in enumerate(criteria):
+            fit = [f"{frontier[name].values[k, c, edge]:.4f}" for name in ("exponent", "exponent_error")]
+            for s, stiffness in enumerate(frontier.stiffness.values):
+                numbers = [frontier[name].values[k, c, s] for name in columns]
+                shown = ["" if np.isnan(number) else f"{number:.0f}" for number in numbers]
+                start = [laws[law], criterion, f"{frontier.tolerance.values[c]:g}", f"{stiffness:.6g}"]
+                lines.append(",".join([*start, f"{frontier.limit.values[s]:.1f}", *shown, *fit]))
+    return "\n".join(lines) + "\n"

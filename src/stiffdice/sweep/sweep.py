@@ -1,0 +1,308 @@
+"""Many runs: compute the columns of a shard, collect shards into one sweep of judged cells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.code_digest import code_digest
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.state import TURNING
+from stiffdice.errors import InputError, RefusedError
+from stiffdice.io.content_digest import CELL, cell_digests, digest_of_cells
+from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import backend, dataset
+from stiffdice.simulation.criteria import judge
+from stiffdice.simulation.criteria import registry as criteria
+from stiffdice.simulation.initial_conditions import phased, turned
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.reference_run import references
+from stiffdice.simulation.run import Run, simulate
+from stiffdice.sweep.grid import Column, Piece, Sweep
+
+# What a shard keeps of each run besides the measures.
+_OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
+
+# Members computed together: their references are in memory together.
+BLOCK = CHUNK_MEMBERS
+
+
+class Kept(Protocol):
+    """Runs that are there already, whoever keeps them."""
+
+    def has(self, column: Column, steps: int) -> bool:
+        """Return whether all members of a cell are there."""
+
+    def runs(self, column: Column, steps: int, members: slice) -> Mapping[str, npt.NDArray[Any]]:
+        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
+
+
+def compute(
+    sweep: Sweep,
+    pieces: Sequence[Piece],
+    path: str | Path,
+    progress: Callable[[float], None] | None = None,
+    kept: Kept | None = None,
+) -> int:
+    """Compute one shard, store it (each run's measures and verdict, dimensions cell and member), and return its cells.
+
+    What is in memory at a time is a block of members in some cells, whatever the size of the sweep. kept: runs that are
+    there already. progress: called with about the fraction of the work done.
+    """
+    total, done = sum(sum(piece.steps) for piece in pieces), 0.0
+    with Spool(path, pattern(sweep)) as spool:
+        for piece in pieces:
+            steps = sum(piece.steps)
+            for fraction in _compute_piece(sweep, piece, spool, kept):
+                if progress is not None:
+                    progress((done + fraction * steps) / total)
+            done += steps
+    return spool.cells
+
+
+def _compute_piece(sweep: Sweep, piece: Piece, spool: Spool, kept: Kept | None) -> Iterator[float]:
+    """Store all members at each number of steps, computed where they are not kept; yield the fraction that is done."""
+    scene, scan = sweep.scene_of(piece.column), piece.steps
+    first = spool.add_cells(len(scan))
+    spool.put(_cell_values(sweep, piece.column, scan), slice(first, first + len(scan)))
+    there = [kept is not None and kept.has(piece.column, steps) for steps in scan]
+    launches = turned(scene, sweep.model, sweep.members)
+    for start in range(0, sweep.members, BLOCK):
+        block = slice(start, min(start + BLOCK, sweep.members))
+        compared = None
+        if "trajectory" in sweep.criteria and not all(there):
+            distinct = launches[block] if sweep.model in TURNING else launches[:1]
+            compared, _ = references(scene, sweep.model, distinct, sweep.horizon)
+        for batch in range(0, len(scan), CHUNK_CELLS):
+            runs = []
+            for steps, known in zip(scan[batch : batch + CHUNK_CELLS], there[batch:], strict=False):
+                if known and kept is not None:
+                    runs.append(kept.runs(piece.column, steps, block))
+                else:
+                    runs.append(_run_values(_run(sweep, scene, steps, launches, block, compared)))
+            cells = slice(first + batch, first + batch + len(runs))
+            spool.put({name: np.stack([run[name] for run in runs]) for name in runs[0]}, cells, block)
+            yield (start + (block.stop - start) * (batch + len(runs)) / len(scan)) / sweep.members
+
+
+def _run(
+    sweep: Sweep,
+    scene: Scene,
+    steps: int,
+    launches: npt.NDArray[np.void],
+    block: slice,
+    compared: npt.NDArray[np.void] | None,
+) -> Run:
+    return simulate(
+        scene,
+        model=sweep.model,
+        simulator=sweep.simulator,
+        scheme=sweep.scheme,
+        steps=steps,
+        members=phased(scene, sweep.model, steps, sweep.members, launches, block),
+        criteria=sweep.criteria,
+        stop=sweep.criteria if sweep.early_stop else None,
+        references=compared,
+        hop_height=sweep.hop_height,
+    )
+
+
+def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str, Any]:
+    scene = sweep.scene_of(column)
+    return {
+        "contact": np.full(len(scan), list(LAWS).index(column.contact), np.int8),
+        "stiffness": np.full(len(scan), column.stiffness),
+        "steps": np.array(scan, np.int64),
+        "omega_h": np.array([linear_theory.omega_h(scene, steps) for steps in scan]),
+    }
+
+
+def _run_values(run: Run) -> dict[str, Any]:
+    """Return what is kept of the runs of a cell by name, shape (member, ...)."""
+    return run.measures | {name: getattr(run, name) for name in _OF_RUNS}
+
+
+def pattern(sweep: Sweep) -> xr.Dataset:
+    """Return one cell with all names, types, units and attributes of the sweep's shards, and no values of its own."""
+    column = sweep.columns()[0]
+    runs = dataset.run_variables(sweep.members)
+    member = np.arange(sweep.members, dtype=np.int32)
+    coordinates = {
+        name: ("cell", value, dataset.CELL_ATTRIBUTES[name]) for name, value in _cell_values(sweep, column, [1]).items()
+    } | {
+        "member": ("member", member, dataset.MEMBER_ATTRIBUTES),
+        "criterion": (
+            "criterion",
+            np.arange(len(criteria.CRITERIA), dtype=np.int8),
+            dataset.criterion_attributes(list(criteria.CRITERIA)),
+        ),
+    }
+    attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
+    return xr.Dataset(runs, coordinates, attributes)
+
+
+def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
+    code = "stiffdice.sweep.sweep", *backend.code_of(sweep.simulator)
+    attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
+    attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
+    attributes |= dataset.config_attributes("shard", sweep.of_runs)
+    attributes["seed"] = sweep.seed
+    attributes["model_reason"] = sweep.model_reason
+    attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
+    attributes["early_stop"] = int(sweep.early_stop)
+    if sweep.early_stop:  # otherwise the measures hold for any tolerances
+        attributes["criteria"] = dataset.criteria_text(sweep.criteria)
+    for name, unit in (("horizon", "s"), ("hop_height", "m")):
+        if name in sweep.of_runs:
+            attributes |= {name: sweep.of_runs[name], f"{name}_units": unit}
+    return attributes
+
+
+def checked(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
+    """Pass a shard on, part by part, if it is the one that `compute` would make of these pieces now.
+
+    Raises RefusedError, naming what is other than planned: attributes (code and scene among them), variables, members,
+    or cells.
+    """
+    like = pattern(sweep)
+    scans = [len(piece.steps) for piece in pieces]
+    planned = {
+        "contact": np.repeat([list(LAWS).index(piece.column.contact) for piece in pieces], scans),
+        "stiffness": np.repeat([piece.column.stiffness for piece in pieces], scans),
+        "steps": np.array([steps for piece in pieces for steps in piece.steps]),
+    }
+    first = 0
+    for part in parts:
+        check_like(part, like)
+        cells = slice(first, first + part.sizes["cell"])
+        for name in CELL:
+            if not np.array_equal(part[name].values, planned[name][cells]):
+                raise RefusedError(f"not the shard planned: has cells of another {name}")
+        first = cells.stop
+        yield part
+    if first < sum(scans):
+        raise RefusedError("not the shard planned: cells are missing")
+
+
+def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
+    """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
+    ours, theirs = pattern.attrs, part.attrs
+    if other := [key for key in ours | theirs if str(ours.get(key)) != str(theirs.get(key))]:
+        raise RefusedError(f"not the shard planned: other {', '.join(other)}")
+    for name in pattern.variables.keys() | part.variables.keys():
+        kinds = {(data[name].dims, data[name].dtype) for data in (pattern, part) if name in data.variables}
+        if len(kinds) > 1 or not (name in pattern.variables and name in part.variables):
+            raise RefusedError(f"not the shard planned: other variable {name}")
+    if part.sizes["member"] != pattern.sizes["member"]:
+        raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")
+
+
+def collect(
+    parts: Iterable[xr.Dataset], tolerances: Mapping[str, float], config: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """Return all cells of all shards, judged: how many members fail each criterion, and the worst of each measure.
+
+    parts: shards, or some cells of one at a time (`io.reader.parts`): in memory are one part, and some 250 bytes for
+    each cell before it, however many members it has. config: what was asked of the whole; None leaves what was asked of
+    each run. Cells are sorted by contact law, stiffness and steps. Raises InputError if the shards were not made from
+    the same scene by the same code, or if there are none.
+    """
+    pattern: xr.Dataset | None = None
+    columns: dict[str, list[npt.NDArray[Any]]] = {}  # of each variable that has cells, its parts
+    digests = []
+    for part in parts:
+        judged = _judged(part, tolerances)
+        pattern = judged.isel(cell=slice(0)) if pattern is None else pattern
+        ours, others = judged.attrs, pattern.attrs
+        differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
+        if differing:
+            raise InputError(f"shards differ in {', '.join(differing)}; they are not of one sweep")
+        for name, variable in judged.variables.items():
+            if "cell" in variable.dims:
+                columns.setdefault(str(name), []).append(variable.values)
+        digests.append(cell_digests(part))
+    if pattern is None:
+        raise InputError("there are no shards; nothing to collect")
+    asked = dataset.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}
+    return _sorted(pattern, columns).assign_attrs(
+        asked,
+        title="Sweep of stiffness and steps",
+        runs_digest=digest_of_cells(digests),
+        judging_code_digest=code_digest("stiffdice.sweep.sweep"),
+    )
+
+
+def _sorted(pattern: xr.Dataset, columns: dict[str, list[npt.NDArray[Any]]]) -> xr.Dataset:
+    """Return all cells, sorted, in the variables of a dataset of none; empties `columns`: none is to be there twice."""
+    order = np.lexsort([np.concatenate(columns[key]) for key in ("steps", "stiffness", "contact")])
+    whole: dict[str, xr.Variable] = {}
+    for key, variable in pattern.variables.items():
+        name = str(key)
+        if name in columns:
+            axis = variable.dims.index("cell")
+            values = np.concatenate(columns.pop(name), axis).take(order, axis)
+            whole[name] = xr.Variable(variable.dims, values, variable.attrs)
+        else:
+            whole[name] = variable
+    return xr.Dataset(
+        {name: variable for name, variable in whole.items() if name not in pattern.coords},
+        {name: variable for name, variable in whole.items() if name in pattern.coords},
+        pattern.attrs,
+    )
+
+
+def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
+    """Return cells with what their members add up to."""
+    measures = {part.MEASURE: runs[part.MEASURE].values for part in criteria.CRITERIA.values()}
+    verdicts = runs["verdict"].values
+    counts = np.stack([(verdicts == verdict).sum(axis=1) for verdict in Verdict], axis=1)
+    asked = list(tolerances)
+    variables: dict[str, Any] = {
+        "failing": (
+            ("criterion", "cell"),
+            (~judge.passes(tolerances, measures, runs["ending"].values)).sum(axis=-1).astype(np.int32),
+            {"long_name": "number of members that fail the criterion", "units": "1"},
+        ),
+        "verdicts": (
+            ("cell", "verdict"),
+            counts.astype(np.int32),
+            {"long_name": "number of members that ended with a verdict", "units": "1"},
+        ),
+        "steps_computed": (
+            "cell",
+            runs["steps_computed"].values.sum(axis=1),
+            {"long_name": "steps computed one by one, of all members", "units": "1"},
+        ),
+        "tolerance": (
+            "criterion",
+            list(tolerances.values()),
+            {"long_name": "tolerance of the criterion", "units": "1"},
+        ),
+    } | {
+        f"largest_{name}": (
+            "cell",
+            _largest(measures[name]),
+            {"long_name": f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}", "units": "1"},
+        )
+        for name in (criteria.CRITERIA[criterion].MEASURE for criterion in asked)
+    }
+    coordinates: dict[str, Any] = {
+        name: ("cell", runs[name].values, dataset.CELL_ATTRIBUTES[name]) for name in dataset.CELL_ATTRIBUTES
+    } | {
+        "criterion": ("criterion", np.arange(len(asked), dtype=np.int8), dataset.criterion_attributes(asked)),
+        "verdict": ("verdict", np.arange(len(Verdict), dtype=np.int8), dataset.VERDICT_ATTRIBUTES),
+    }
+    return xr.Dataset(variables, coordinates, dict(runs.attrs) | {"members": runs.sizes["member"]})
+
+
+def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return the largest of the members, shape (cell,); not-a-number only where all are."""
+    numbers = np.where(np.isnan(measure), -np.inf, measure).max(axis=1)
+    return np.asarray(np.where(np.isneginf(numbers), np.nan, numbers))

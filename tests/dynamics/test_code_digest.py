@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from stiffdice.dynamics.code_digest import PACKAGE, code_digest
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of the package that a test may change."""
+    target = tmp_path / "src" / "stiffdice"
+    shutil.copytree(PACKAGE, target, ignore=shutil.ignore_patterns("__pycache__"))
+    return target
+
+
+def python(copy, code, **environment):
+    path = {"PYTHONPATH": str(copy.parent)} | environment
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, **path}
+    )
+    return done.stdout.strip()
+
+
+def digest_of(copy, module):
+    return python(copy, f"from stiffdice.dynamics.code_digest import code_digest; print(code_digest({module!r}))")
+
+
+SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.sweep", "stiffdice.simulation.dataset"}
+DRAWING = {"stiffdice.report.figures.cube"}
+COMPARING = {"stiffdice.experiments.work_precision.measure"}
+DRIVING = {"stiffdice.simulation.engines.driver"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "touches"),
+    [
+        ("dynamics/contact.py", SIMULATION | COMPARING | DRIVING),
+        ("dynamics/models/tumbling.py", SIMULATION | COMPARING | DRIVING),
+        ("simulation/criteria/apex.py", SIMULATION | COMPARING | DRIVING),
+        ("simulation/fast_forward.py", SIMULATION | COMPARING),
+        ("simulation/reference_run.py", {"stiffdice.sweep.sweep"}),
+        ("io/shard_writer.py", {"stiffdice.sweep.sweep"}),
+        ("simulation/engines/scipy_ivp.py", COMPARING | DRIVING),
+        ("simulation/engines/octave.m", COMPARING | DRIVING),
+        ("simulation/engines/driver.py", DRIVING),
+        ("report/figures/style.py", DRAWING),
+        ("report/figures/cube.py", DRAWING),
+        ("report/figures/stability/stability_limits.py", set()),
+        ("cli/main.py", set()),
+        ("__init__.py", SIMULATION | DRAWING | COMPARING | DRIVING),
+    ],
+)
+def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
+    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING | DRIVING}
+    with (copy / changed).open("a") as file:
+        file.write("\n# changed\n")
+    after = {module: digest_of(copy, module) for module in before}
+    assert {module for module in before if before[module] != after[module]} == touches
+
+
+def test_digests_do_not_depend_on_where_the_code_lies(copy):
+    assert digest_of(copy, "stiffdice.sweep.sweep") == code_digest("stiffdice.sweep.sweep")
+
+
+# A kernel that compiles quickly, and calls what another file says of a height.
+RUN = """
+from stiffdice.dynamics.energy import energies
+from stiffdice.scene.scene import from_mapping
+from stiffdice.dynamics.state import physics_of, start_of
+scene = from_mapping({"launch": {"position": [0, 0, -1]}})
+print(energies(physics_of(scene), start_of(scene, "sliding"))[2][0])
+"""
+
+
+@pytest.mark.parametrize("first", ["", "import numba\n"], ids=["", "numba imported before"])
+def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
+    """Numba itself would not notice: the kernel that is cached lies in another file."""
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    before = python(copy, first + RUN, **cache)
+    assert python(copy, first + RUN, **cache) == before
+    law = copy / "dynamics/contact.py"
+    law.write_text(law.read_text().replace("physics.nz * state.position[2]", "2.0 * physics.nz * state.position[2]", 1))
+    after = python(copy, first + RUN, **cache)
+    assert float(after) > float(before)
+    assert len(list((tmp_path / "cache" / "stiffdice").iterdir())) == 2
+
+
+def test_a_home_that_cannot_be_written_is_no_hindrance(copy, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    assert python(copy, RUN, NUMBA_CACHE_DIR=str(blocked))

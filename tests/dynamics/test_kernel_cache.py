@@ -1,0 +1,227 @@
+"""Whatever became of a compiled kernel on disk, a run gives the same bytes, and the cache is whole afterwards."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stiffdice.dynamics.kernel_cache import KernelFiles
+
+ROOT = Path(__file__).parents[2]
+KERNEL = {"code": bytes(range(256))}
+
+
+class Bomb:
+    def __reduce__(self):
+        return (os._exit, (9,))
+
+
+@pytest.fixture
+def kernels(tmp_path):
+    return KernelFiles(tmp_path, "march", "stamp")
+
+
+def is_healed(kernels):
+    """A damaged kernel is as good as none, and the next one replaces it."""
+    assert kernels.load("key") is None
+    kernels.save("key", KERNEL)
+    assert [path.name for path in kernels.path("key").parent.iterdir()] == [kernels.path("key").name]
+    return kernels.load("key") == KERNEL
+
+
+def test_a_kernel_cut_short_anywhere_is_made_again(kernels):
+    kernels.save("key", KERNEL)
+    whole = kernels.path("key").read_bytes()
+    for length in range(len(whole)):
+        kernels.path("key").write_bytes(whole[:length])
+        assert is_healed(kernels)
+
+
+def test_a_kernel_with_any_bit_flipped_is_made_again(kernels):
+    kernels.save("key", KERNEL)
+    whole = kernels.path("key").read_bytes()
+    for bit in range(8 * len(whole)):
+        damaged = bytearray(whole)
+        damaged[bit // 8] ^= 1 << bit % 8
+        kernels.path("key").write_bytes(damaged)
+        assert kernels.load("key") is None
+    assert is_healed(kernels)
+
+
+def test_nothing_that_does_not_match_its_digest_is_unpickled(kernels):
+    content = pickle.dumps(Bomb())
+    for digest in (bytes(32), hashlib.sha256(content + b"x").digest(), hashlib.sha256().digest(), b""):
+        kernels.path("key").write_bytes(digest + content)
+        assert is_healed(kernels)
+
+
+def test_another_kernel_under_its_name_is_not_taken_for_it(kernels, tmp_path):
+    kernels.save("other key", KERNEL)
+    kernels.path("other key").rename(kernels.path("key"))
+    assert is_healed(kernels)
+    other = KernelFiles(tmp_path, "march", "stamp of an older source")
+    kernels.path("key").rename(other.path("key"))
+    assert other.load("key") is None
+
+
+def test_a_folder_in_its_place_goes(kernels):
+    (kernels.path("key") / "sub").mkdir(parents=True)
+    assert is_healed(kernels)
+
+
+def test_a_link_in_its_place_goes_and_what_it_points_at_stays(kernels, tmp_path_factory):
+    target = tmp_path_factory.mktemp("other") / "file"
+    target.write_bytes(b"mine")
+    kernels.path("key").symlink_to(target)
+    assert is_healed(kernels)
+    assert target.read_bytes() == b"mine"
+
+
+TWO = """
+import sys
+from pathlib import Path
+from stiffdice.dynamics.kernel_cache import KernelFiles
+kernels = KernelFiles(Path(sys.argv[1]), "march", "stamp")
+for k in range(400):
+    if k % 7 == 0:
+        kernels.path("shared").write_bytes(b"cut short")
+    for key in ("shared", sys.argv[2]):
+        found = kernels.load(key)
+        assert found in (None, key * 1000), found
+        kernels.save(key, key * 1000)
+assert kernels.load(sys.argv[2]) == sys.argv[2] * 1000
+"""
+
+
+def test_processes_that_write_at_once_read_whole_kernels_or_none(kernels, tmp_path):
+    """Among them is damage, too."""
+    started = [subprocess.Popen([sys.executable, "-c", TWO, tmp_path, name]) for name in ("one", "two", "three")]
+    assert [process.wait() for process in started] == [0, 0, 0]
+    names = {kernels.path(key).name for key in ("shared", "one", "two", "three")}
+    assert {path.name for path in tmp_path.iterdir()} == names
+
+
+def run(folder, out, **changes):
+    command = ["run", "config/scenes/figure-09.yaml", "--model", "vertical", "-o", str(folder / out)]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")} | changes
+    done = subprocess.run(
+        [sys.executable, "-m", "stiffdice.cli", *command],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    return (folder / out).read_bytes()
+
+
+def cached(folder):
+    return {path: path.read_bytes() for path in sorted((folder / "cache").rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """A folder with the kernels of a run, and what the run stored."""
+    folder = tmp_path_factory.mktemp("compiled")
+    return folder, run(folder, "first.h5")
+
+
+def flipped(path, whole, rng):
+    damaged = bytearray(whole)
+    damaged[rng.integers(len(whole))] ^= 1 << int(rng.integers(8))
+    path.write_bytes(damaged)
+
+
+def cut_short(path, whole, rng):
+    path.write_bytes(whole[: rng.integers(len(whole))])
+
+
+def emptied(path, whole, rng):
+    path.write_bytes(b"")
+
+
+def made_a_folder(path, whole, rng):
+    path.unlink()
+    path.mkdir()
+
+
+@pytest.mark.parametrize("damages", [[flipped], [cut_short, emptied, made_a_folder]], ids=["bits", "files"])
+def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled, damages):
+    folder, first = compiled
+    whole, rng = cached(folder), np.random.default_rng(15)
+    assert len(whole) >= 4
+    for damage, (path, content) in zip(itertools.cycle(damages), whole.items(), strict=False):
+        damage(path, content, rng)
+    assert run(folder, "again.h5") == first
+    healed = cached(folder)
+    assert healed.keys() == whole.keys()
+    assert run(folder, "warm.h5") == first
+    assert cached(folder) == healed  # nothing was compiled again
+
+
+def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
+    """What lies where a folder of kernels belongs is a file."""
+    folder, first = compiled
+    for kernels in {path.parent for path in cached(folder)}:
+        place = tmp_path / kernels.relative_to(folder)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.parent.parent.chmod(0o700)
+        place.write_text("")
+    assert run(tmp_path, "out.h5") == first
+    assert not list(tmp_path.rglob("*.nbc"))
+
+
+CHOSEN = "import os, stiffdice.dynamics.compilation; print(os.environ['NUMBA_CACHE_DIR'])"
+
+
+def chosen(folder, **places):
+    """Return the folder for kernels that a new process chooses, its caches and temporary files at these places."""
+    environment = {key: value for key, value in os.environ.items() if key not in {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"}}
+    environment |= {"HOME": str(folder / "nowhere/home"), "TMPDIR": str(folder)} | places
+    done = subprocess.run(
+        [sys.executable, "-c", CHOSEN], env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    return Path(done.strip())
+
+
+def test_where_the_home_cannot_be_written_kernels_lie_with_temporary_files(tmp_path):
+    (tmp_path / "nowhere").write_text("")
+    first = chosen(tmp_path)
+    assert first.parent == tmp_path / f"stiffdice-{os.getuid()}"
+    assert [folder.stat().st_mode & 0o777 for folder in (first, first.parent)] == [0o700, 0o700]
+    assert chosen(tmp_path) == first
+
+
+def to_link(folder):
+    folder.rename(folder.with_name("elsewhere"))
+    folder.symlink_to("elsewhere")
+
+
+def to_stranger(folder):
+    if os.getuid():
+        pytest.skip("only root can give a folder away")
+    os.chown(folder, 12345, -1)
+
+
+@pytest.mark.parametrize("change", [to_link, to_stranger, lambda folder: folder.chmod(0o777)])
+@pytest.mark.parametrize("which", ["leaf", "parent"])
+@pytest.mark.parametrize("place", ["tmp", "home"])
+def test_a_folder_that_another_could_have_filled_is_not_used(tmp_path, change, which, place):
+    if place == "tmp":
+        (tmp_path / "nowhere").write_text("")
+    first = chosen(tmp_path)
+    assert first.parent == (
+        tmp_path / f"stiffdice-{os.getuid()}" if place == "tmp" else tmp_path / "nowhere/home/.cache/stiffdice"
+    )
+    change(first if which == "leaf" else first.parent)
+    assert not chosen(tmp_path).resolve().is_relative_to(first.parent.resolve())

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.model_selection import least_model
+from stiffdice.dynamics.models.registry import MODELS
+from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.errors import InputError
+from stiffdice.experiments import model_ablation
+from stiffdice.integrators import registry as schemes
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.scene.scene import Scene, from_mapping
+
+pytestmark = pytest.mark.long
+
+STIFFNESS, FRICTION = (1e3, 1e5), (0.0, 0.01, 0.075)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return model_ablation.measure(Scene(), stiffness=STIFFNESS, friction=FRICTION, horizon=3.3)
+
+
+@pytest.mark.parametrize("contact", ["ungated", "gated"])
+def test_each_scene_needs_all_but_its_piece(contact):
+    found = model_ablation.pieces_of(Scene().with_ground(contact=contact))
+    for name, piece in found.items():
+        assert least_model(piece.scene)[0] == piece.least, name
+    assert (found["tensor"].full, found["all"].full) == ("tensor", "tumbling")
+
+
+def test_a_tensor_that_turns_with_a_cube_changes_nothing():
+    scene = from_mapping({"launch": {"angular_momentum": [0.3, 0.5, -0.2]}, "duration": 1.8})
+    law, model, steps = LAWS["ungated"], MODELS["tumbling"], 3000
+    plain, turning, tensor = start_of(scene, "tumbling"), start_of(scene, "tumbling"), model_ablation._tensor_of(scene)
+    step = physics_of(scene), scene.duration / steps
+    model_ablation._take(schemes.SCHEMES["symplectic_euler"], model, law, step[0], plain, step[1], steps)
+    model_ablation._take_with_tensor(model, law, step[0], turning, tensor, step[1], steps)
+    for part in ("position", "velocity", "angular_momentum", "angular_velocity", "node_offset"):
+        np.testing.assert_allclose(turning[part], plain[part], rtol=0, atol=1e-9, err_msg=part)
+    assert np.abs(plain["node_offset"] - start_of(scene, "tumbling")["node_offset"]).max() > 0.5
+    np.testing.assert_allclose(tensor["inertia"][0], scene.cube.moment_of_inertia * np.eye(3), rtol=0, atol=1e-13)
+
+
+def test_a_tensor_that_is_not_isotropic_turns_with_its_body():
+    """A freely turning body keeps its angular momentum and, to the step's first order, its energy L·ω/2."""
+    scene = from_mapping({"ground": {"contact": "gated"}, "launch": {"position": [0, 0, 99]}, "gravity": 0})
+    state, tensor = start_of(scene, "tumbling"), model_ablation._tensor_of(scene)
+    tensor["inertia"] = np.diag([0.1, 0.2, 0.3])
+    state["angular_momentum"] = spin = np.array([0.3, 0.1, 0.2])
+    before = spin @ np.linalg.solve(tensor["inertia"][0], spin) / 2
+    model_ablation._take_with_tensor(MODELS["tumbling"], LAWS["gated"], physics_of(scene), state, tensor, 1e-4, 20_000)
+    np.testing.assert_allclose(np.linalg.eigvalsh(tensor["inertia"][0]), [0.1, 0.2, 0.3], rtol=1e-9)
+    assert np.abs(tensor["inertia"][0] - np.diag([0.1, 0.2, 0.3])).max() > 0.02
+    assert spin @ np.linalg.solve(tensor["inertia"][0], spin) / 2 == pytest.approx(before, rel=1e-3)
+
+
+def test_without_friction_ground_cube_is_exact(measured):
+    exact = measured.sel(friction=0.0)
+    assert np.nanmax(np.abs(exact.landing_error)) < 1e-9
+    assert np.isnan(exact.parting_time).all()
+    assert np.abs(exact.spin).max() < 1e-9
+
+
+def test_with_friction_it_is_not(measured):
+    """The paper's own ground, S = 1e3 to 1e5, D = 0.2, mu = 0.075."""
+    rough = measured.sel(friction=0.075)
+    error, parting = rough.landing_error.values, rough.parting_time.values
+    assert (error[0] > 0.01).all()
+    assert (parting < rough.second_landing.values).all()
+    assert (np.degrees(rough.tilt.values) > 20).all()
+    assert meanings_of(measured.approximation) == ["sliding", "frictionless"]
+    assert (error[1] > 10 * error[0]).all()
+    assert (rough.numerical_error < 0.01).all()
+
+
+@pytest.mark.parametrize(("inertia", "sense"), [("solid", -1), ("corners", 1)])
+def test_little_friction_leaves_the_spin_of_theory(inertia, sense):
+    """A solid cube rolls backwards: the springs swing it back within the bounce."""
+    scene = from_mapping({"cube": {"inertia": inertia}})
+    spin = model_ablation.measure(scene, stiffness=(1e5,), friction=(0.01,), horizon=2.2)
+    np.testing.assert_allclose(spin.spin, spin.spin_theory, rtol=0.03)
+    assert (np.sign(spin.spin) == sense).all()
+
+
+def test_the_spin_of_theory_is_the_spin_of_its_equation():
+    scene = from_mapping({"cube": {"inertia": "corners"}, "ground": {"stiffness": 100, "friction": 0.1}})
+    cube, speed, steps = scene.cube, 2.0, 200_000
+    omega, arm = np.sqrt(4 * 100 / cube.mass), cube.side / 2
+    h, angle, rate = np.pi / omega / steps, 0.0, 0.0
+    for k in range(steps):
+        push = cube.mass * omega * speed * np.sin(omega * (k + 0.5) * h)
+        rate += h * (0.1 * push * arm - 100 * cube.side**2 * angle) / cube.moment_of_inertia
+        angle += h * rate
+    assert model_ablation.first_spin(scene, speed) == pytest.approx(rate, rel=1e-4)
+
+
+def test_work_is_counted_and_everything_has_units(measured):
+    least, full = measured.evaluations.sel(role=1), measured.evaluations.sel(role=0)
+    assert (least <= full).all()
+    assert (measured.numbers.sel(role=1) < measured.numbers.sel(role=0)).all()
+    for name, variable in measured.variables.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+
+
+@pytest.mark.long
+def test_times_are_told_apart_from_what_rebuilds_share():
+    timed = model_ablation.time(Scene().with_ground(contact="gated"), steps=500, rounds=3)
+    assert timed.step_time.dims == ("piece", "role")
+    assert (timed.step_time > 0).all()
+    bare = meanings_of(timed.piece).index("tensor")
+    assert np.flatnonzero(np.isnan(timed.run_ratio)).tolist() == [bare]
+    assert (timed.step_ratio > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "told"),
+    [
+        ({"velocity": (0.0, 0.0, 5.0)}, {}, "launch: allowed is an upright cube without spin"),
+        ({"angular_momentum": (0.0, 0.0, 1.0)}, {}, "launch: allowed"),
+        ({}, {"friction": [-1]}, "friction = -1"),
+        ({}, {"stiffness": [0]}, "stiffness = 0"),
+        ({}, {"tolerance": 0}, "tolerance = 0"),
+    ],
+)
+def test_what_cannot_be_measured_is_said(changes, options, told):
+    scene = Scene(launch=dataclasses.replace(Scene().launch, **changes))
+    with pytest.raises(InputError, match=told):
+        model_ablation.measure(scene, **options)

@@ -1,0 +1,121 @@
+"""A regime's forces are the contact law's, and its switches change as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.dynamics.models import registry as models
+from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.integrators.event_driven import active_set
+from stiffdice.scene.scene import from_mapping
+
+RANDOM = np.random.default_rng(5)
+
+
+@njit(cache=True)
+def law_force(model, law, physics, state):
+    return models.force(model, law, physics, state[0])
+
+
+@njit(cache=True)
+def motion_of(turning, state, motion):
+    active_set.take(turning, state[0], motion)
+
+
+@njit(cache=True)
+def derivative(turning, physics, nodes, bits, motion, rate):
+    active_set.derivative(turning, physics, nodes, bits, motion, rate)
+
+
+@njit(cache=True)
+def begin(turning, dragging, physics, nodes, motion, bits, small):
+    active_set.vanishing(physics, motion, small)
+    active_set.begin(turning, dragging, physics, nodes, motion, bits, small)
+
+
+@njit(cache=True)
+def switches(turning, dragging, physics, nodes, bits, motion, rate, value, slope):
+    active_set.switches(turning, dragging, physics, nodes, bits, motion, rate, value, slope)
+
+
+def landing(law, stiffness=1e4, height=0.4, **ground):
+    """A cube somewhere in the ground, tilted, turning and sliding."""
+    return from_mapping(
+        {
+            "ground": {"contact": law, "stiffness": stiffness, "damping": 3.0, "friction": 0.4, **ground},
+            "launch": {
+                "position": [0.1, 0.2, height],
+                "velocity": list(RANDOM.normal(size=3)),
+                "angular_momentum": list(RANDOM.normal(size=3)),
+                "orientation": list(RANDOM.normal(size=3)),
+                "node_velocity": "rigid",
+            },
+        }
+    )
+
+
+def begun(scene, model="tumbling"):
+    turning = model == "tumbling"
+    launch, physics = start_of(scene, model), physics_of(scene)
+    motion = np.zeros(active_set.SIZE)
+    motion_of(turning, launch, motion)
+    bits, nodes = np.zeros(8, np.int8), launch["node_offset"][0].copy()
+    begin(turning, scene.ground.contact == "ungated", physics, nodes, motion, bits, np.zeros(2))
+    return turning, physics, nodes, bits, motion
+
+
+def rate_of(turning, physics, nodes, bits, motion):
+    rate = np.zeros_like(motion)
+    derivative(turning, physics, nodes, bits, motion, rate)
+    return rate
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+def test_the_forces_are_those_of_the_law(law, model):
+    touched = 0
+    for height in np.linspace(-0.8, 1.2, 60):
+        scene = landing(law, height=float(height), normal=[0.1, -0.2, 0.9])
+        parts = begun(scene, model)
+        rate = rate_of(*parts)
+        wrench = law_force(models.MODELS[model], LAWS[law], physics_of(scene), start_of(scene, model))
+        np.testing.assert_allclose(rate[3:6] * scene.cube.mass, wrench[:3], rtol=1e-12, atol=1e-10)
+        if model == "tumbling":
+            np.testing.assert_allclose(rate[6:9], wrench[3:], rtol=1e-12, atol=1e-9)
+        touched += bool(parts[3].any())
+    assert touched > 20
+
+
+def test_the_quaternion_turns_at_the_spin():
+    parts = begun(landing("gated"))
+    spin = parts[4][6:9] / parts[1].inertia
+    rate = rate_of(*parts)
+    np.testing.assert_allclose(rate[9:13], [0, *(spin / 2)], atol=1e-15)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_switches_change_as_their_slopes_say(law):
+    for _ in range(20):
+        turning, physics, nodes, bits, motion = begun(landing(law))
+        rate = rate_of(turning, physics, nodes, bits, motion)
+        values, slope, other = np.zeros((2, 16)), np.zeros(16), np.zeros(16)
+        d = 1e-7
+        for end, sign in enumerate((-1, 1)):
+            moved = motion + sign * d * rate
+            switches(
+                turning,
+                law == "ungated",
+                physics,
+                nodes,
+                bits,
+                moved,
+                rate_of(turning, physics, nodes, bits, moved),
+                values[end],
+                other,
+            )
+        switches(turning, law == "ungated", physics, nodes, bits, motion, rate, other, slope)
+        np.testing.assert_allclose((values[1] - values[0]) / (2 * d), slope, rtol=1e-6, atol=1e-5)
+        assert (other >= 0).all()

@@ -1,0 +1,134 @@
+"""Files from elsewhere are tried by another process: whatever happens to it, this one goes on and names the file."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+from tests.fuzz.hdf5_blocks import changed
+from tests.fuzz.readers import READERS
+from tests.io.test_structure_check import add, whole
+
+from stiffdice.errors import InputError, RefusedError
+from stiffdice.io import isolation, seal
+from stiffdice.io.structure_check import LARGEST_PIECE
+from stiffdice.io.writer import write_dataset
+
+
+@pytest.fixture
+def stored(tmp_path):
+    path = tmp_path / "x.h5"
+    write_dataset(whole(), path)
+    return path
+
+
+def test_what_is_sound_is_admitted(stored):
+    isolation.admit(stored, str(stored))
+    isolation.admit()
+
+
+def test_what_is_not_is_refused_by_name(stored, tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path / 'y.h5'}: No such file"):
+        isolation.admit(stored, tmp_path / "y.h5")
+    (tmp_path / "y.h5").write_text("hello")
+    with pytest.raises(RefusedError, match=f"{tmp_path / 'y.h5'}: not a readable HDF5 file"):
+        isolation.admit(stored, tmp_path / "y.h5")
+
+
+@pytest.mark.parametrize("name", ["a b\nc.h5", "ü.h5", "'", "\udcff.h5"])
+def test_any_name_can_be_asked_for(stored, tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(stored.read_bytes())
+    assert isolation.refused([path]) == {}
+
+
+def test_a_name_that_no_file_has_is_refused(stored):
+    assert "no file has such a name" in str(isolation.refused([f"a\0{stored}"])[f"a\0{stored}"])
+
+
+@pytest.mark.parametrize("end", [signal.SIGSEGV, signal.SIGKILL, signal.SIGSTOP])
+def test_a_file_that_ends_the_child_or_holds_it_up_is_refused_and_the_next_is_tried(stored, monkeypatch, end):
+    """What the HDF5 library does to the child on a file that was made to, done to it from here."""
+    monkeypatch.setattr(isolation, "SECONDS", 1)
+    monkeypatch.setattr(isolation, "PATIENCE", 1)
+    children = []
+
+    class Doomed(isolation.Child):
+        def __enter__(self):
+            children.append(super().__enter__())
+            if len(children) == 1:
+                os.kill(self._process.pid, end)
+            return self
+
+    monkeypatch.setattr(isolation, "Child", Doomed)
+    other = stored.with_name("y.h5")
+    other.write_bytes(stored.read_bytes())
+    found = isolation.refused([stored, other])
+    assert list(found) == [str(stored)]
+    assert "the HDF5 library fails on it" in str(found[str(stored)])
+    assert len(children) == 2
+
+
+@pytest.mark.parametrize("seed", [210, 639])
+def test_a_file_that_makes_the_library_crash_is_refused(stored, tmp_path_factory, seed):
+    """Two that the fuzz test found: a division by zero and a segmentation fault in HDF5 2.0.0."""
+    samples = READERS["forged"](tmp_path_factory.mktemp("samples")).samples
+    image = changed(samples[seed % len(samples)], samples, seed)
+    stored.write_bytes(image + seal.line_of(image))
+    with pytest.raises(RefusedError, match=f"{stored}: (the HDF5 library fails on it|not a readable HDF5 file)"):
+        isolation.admit(stored)
+
+
+@pytest.mark.long
+def test_a_bomb_inside_a_chunk_does_not_get_the_memory(stored):
+    """Deflate swells past the chunk that it is for: 2 MB are stored, and stand for 2 GB."""
+    block = zlib.compressobj(9)
+    zeros = block.compress(bytes(32 << 20)) + block.flush(zlib.Z_FULL_FLUSH)
+    head, body = zeros[:2], zeros[2:]
+    with h5py.File(stored, "a") as file:
+        more = add(file, "more", np.zeros(3), chunks=(3,), compression="gzip")
+        del more, file["more"]
+        size = LARGEST_PIECE // 8
+        file.create_dataset("size", (size,), "f8").make_scale("This is a netCDF dimension but not a netCDF variable")
+        file["size"].attrs["_Netcdf4Dimid"] = np.int32(99)
+        more = add(file, "more", np.zeros(size), ("size",), chunks=(size,), compression="gzip")
+        more.id.write_direct_chunk((0,), head + body * (LARGEST_PIECE // len(body)))
+    seal.seal(stored)
+    with pytest.raises(RefusedError, match=f"{stored}: not a readable HDF5 file|more memory"):
+        isolation.admit(stored)
+
+
+def test_the_child_has_its_limits():
+    resource = pytest.importorskip("resource")
+    code = f"""
+import resource
+from stiffdice.io import isolation
+isolation._limit(7)
+print(*[resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_CORE)])
+try:
+    bytearray(isolation.MEMORY)
+except MemoryError:
+    print("no more")
+assert resource.getrlimit(resource.RLIMIT_CPU)[0] <= {7 + 10}
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:2] == [f"{isolation.MEMORY} 0", "no more"]
+    assert resource.getrlimit(resource.RLIMIT_AS)[0] != isolation.MEMORY, "the parent keeps its own"
+
+
+def test_the_child_needs_little_to_start():
+    code = "import sys, stiffdice.io.isolation; print(*{'xarray', 'numba', 'h5netcdf', 'yaml'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
+
+
+def test_nothing_beside_a_file_is_run(stored, monkeypatch):
+    (stored.parent / "h5py.py").write_text("raise SystemExit('imported from the folder of the file')")
+    monkeypatch.chdir(stored.parent)
+    isolation.admit("x.h5")

@@ -1,0 +1,216 @@
+from __future__ import annotations
+
+import struct
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from matplotlib.animation import FuncAnimation
+from PIL import Image
+
+from stiffdice.report import number_format
+from stiffdice.report.figures import cube, style
+from stiffdice.report.figures import registry as figures
+from stiffdice.scene.scene import from_mapping
+from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.run import simulate
+from stiffdice.study.catalogue import DRAWINGS
+from stiffdice.sweep import stability_limits
+
+
+def dataset(model, preset, **keys):
+    scene = from_mapping(keys, preset=preset)
+    return run_dataset(simulate(scene, model=model, steps=3000, every=10))
+
+
+@pytest.fixture(scope="module")
+def data(collected):
+    presets = ("as_listed", "as_written")
+    spin = {"angular_momentum": {"seed": 1}}
+    throw = {preset: dataset("tumbling", preset, launch=spin, duration=2) for preset in presets}
+    slide = {preset: dataset("sliding", preset, ground={"stiffness": 1e5}) for preset in presets}
+    return {"cube": throw, "posi": slide, "ener": slide, "fron": {"steps-needed": stability_limits.find(collected)}}
+
+
+def drawn(drawing, given, title="A title"):
+    """The figure, not yet a file."""
+    with style.applied():
+        return DRAWINGS[drawing].load()(given, title)
+
+
+# Those of experiments and other sweeps are tested where they are defined.
+@pytest.mark.parametrize(
+    "drawing",
+    [name for name, entry in DRAWINGS.items() if entry.given == "runs" and name != "animation"] + ["frontier"],
+)
+def test_each_drawing_has_units_on_its_axes_and_gives_equal_files(data, tmp_path, drawing):
+    given = data[drawing[:4]]
+    for axes in drawn(drawing, given).axes:
+        outer = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
+        assert not outer or "[" in axes.get_xlabel(), axes
+        first = axes.get_subplotspec() is None or axes.get_subplotspec().is_first_col()
+        assert not first or "[" in axes.get_ylabel(), axes
+    for name in "ab":
+        figures.draw(drawing, given, "A title", 80, [str(tmp_path / f"{name}.{kind}") for kind in ("svg", "png")])
+    for kind in ("svg", "png"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    assert (tmp_path / "a.svg").read_text().startswith("<?xml")
+    width, height = struct.unpack(">II", (tmp_path / "a.png").read_bytes()[16:24])
+    assert min(width, height) > 200
+    assert np.asarray(Image.open(tmp_path / "a.png").convert("L")).std() > 5  # not blank
+
+
+def test_the_animation_runs_in_real_time(data, tmp_path):
+    path = tmp_path / "throw.gif"
+    figures.draw("animation", data["cube"], "The throw", 80, [str(path)])
+    with Image.open(path) as gif:
+        times = []
+        for frame in range(gif.n_frames):
+            gif.seek(frame)
+            times.append(gif.info["duration"])
+    assert sum(times) == pytest.approx(2000, abs=100)  # ms, of a throw of 2 s
+
+
+def test_the_animation_shows_the_cube_where_it_is(data):
+    run = data["cube"]["as_listed"]
+    with style.applied():
+        animation = cube.animation(data["cube"], "The throw")
+        assert isinstance(animation, FuncAnimation)
+        edges, trace, clock = animation._func(39)
+    assert clock.get_text() == "t =  2.0 s"
+    assert trace.get_data_3d()[2][-1] == run.position[-1, 2]
+    corners = np.asarray(edges._segments3d).reshape(-1, 3)
+    centre = run.position.values[-1]
+    np.testing.assert_allclose(corners.mean(axis=0), centre, atol=1e-12)
+    animation._draw_was_started = True  # it is not to be played
+
+
+def test_the_cube_is_drawn_turned_as_it_is(data):
+    run = data["cube"]["as_listed"]
+    for drawing, moment in (("cube-start", 0.0), ("cube-middle", 0.5), ("cube-end", 1.0)):
+        axes = drawn(drawing, data["cube"]).axes[0]
+        index = round(moment * (run.sizes["time"] - 1))
+        (cube,) = (part for part in axes.collections if len(getattr(part, "_segments3d", ())) == 12)
+        corners = np.unique(np.asarray(cube._segments3d).reshape(-1, 3).round(9), axis=0)
+        expected = np.unique((run.position.values[index] + run.node_offset.values[index]).round(9), axis=0)
+        np.testing.assert_allclose(corners, expected, atol=1e-8)
+
+
+def test_a_tilted_ground_is_drawn_where_it_is(data):
+    tilted = {"normal": [0.3, 0.1, 1.0]}
+    run = {"as_listed": dataset("tumbling", "as_listed", ground=tilted, launch={"position": [0, 0, 4]}, duration=1)}
+    axes = drawn("cube-end", run).axes[0]
+    (ground,) = (part for part in axes.collections if hasattr(part, "_faces"))
+    np.testing.assert_allclose(np.asarray(ground._faces).reshape(-1, 3) @ tilted["normal"], 0, atol=1e-9)
+
+
+def lines_of(axes):
+    return {line.get_label(): np.asarray(line.get_xydata()) for line in axes.get_lines()}
+
+
+def test_position_is_drawn_for_both_readings(data):
+    figure = drawn("position", data["cube"])
+    for k, axes in enumerate(figure.axes):
+        for preset, label in (("as_listed", "as listed"), ("as_written", "as written")):
+            run = data["cube"][preset]
+            np.testing.assert_array_equal(lines_of(axes)[label], np.stack([run.time, run.position[:, k]], axis=1))
+
+
+def test_energy_is_drawn_with_and_without_the_springs(data):
+    figure = drawn("energy", data["ener"])
+    for axes, run in zip(figure.axes, data["ener"].values(), strict=True):
+        lines = lines_of(axes)
+        np.testing.assert_array_equal(lines["paper's: kinetic + m g z"][:, 1], run.energy_paper)
+        np.testing.assert_array_equal(lines["mechanical: with the springs"][:, 1], run.mechanical_energy)
+        # The launch's velocity counts as half a step old, as every later one: 54.4 J less m g h/2 times 5 m/s.
+        late = 9.8 * run.attrs["step_size"] / 2 * (5 - 9.8 * run.attrs["step_size"] / 4)
+        np.testing.assert_allclose(lines["energy at launch"][:, 1], 54.4 - late, rtol=1e-13)
+
+
+CRITERIA = ["energy", "apex"]
+LAST_FAIL = 1
+
+
+def test_the_frontier_is_drawn_where_it_is(data):
+    found = data["fron"]["steps-needed"]
+    figure = drawn("frontier", data["fron"])
+    upper, lower = figure.axes[1], figure.axes[3]  # the gated column
+    lines = [np.asarray(line.get_xydata()) for line in upper.get_lines()]
+    wanted = [found.limit.values]
+    for c in range(len(CRITERIA)):
+        wanted += [found.last_fail.values[1, c], found.first_pass.values[1, c]]
+        factor, exponent = (found[name].values[1, c, LAST_FAIL] for name in ("factor", "exponent"))
+        wanted += [factor * found.stiffness.values**exponent]
+    assert len(lines) == len(wanted)
+    for line, values in zip(lines, wanted, strict=True):
+        np.testing.assert_allclose(line, np.stack([found.stiffness, values], axis=1))
+    full = [line for line in upper.get_lines() if line.get_markerfacecolor() != "none" and line.get_marker() != "None"]
+    assert len(full) == len(CRITERIA)  # last fail is the full mark
+    below = [np.asarray(line.get_xydata())[:, 1] for line in lower.get_lines()]
+    assert set(below[0]) == {2.0}
+    np.testing.assert_allclose(below[1], np.sqrt(4 * found.stiffness) * 10 / found.last_fail.values[1, 0])
+    dots = lower.collections[0]
+    inside = found.cell_contact.values == 1
+    np.testing.assert_allclose(dots.get_offsets()[:, 1], found.cell_omega_h.values[inside])
+    np.testing.assert_allclose(dots.get_array(), 1 - found.pass_fraction.values[:, inside].min(axis=0))
+
+
+def test_the_band_about_a_law_is_drawn(data):
+    found = data["fron"]["steps-needed"]
+    upper = drawn("frontier", data["fron"]).axes[1]
+    fits = {name: float(found[name].values[1, 1, LAST_FAIL]) for name in stability_limits.FIT}
+    low, high = stability_limits.band(fits, found.stiffness.values)
+    outlines = [path.vertices for part in upper.collections for path in part.get_paths()]
+    for edge in (low, high):
+        points = np.stack([found.stiffness.values, edge], axis=1)
+        assert any(all(np.isclose(outline, point).all(axis=1).any() for point in points) for outline in outlines)
+
+
+def test_each_sweep_has_its_columns_and_each_criterion_its_look(data):
+    one = data["fron"]["steps-needed"]
+    figure = drawn("frontier", {"a": one, "b": one.assign_attrs(model="tumbling").isel(contact=[1])})
+    titles = [axes.get_title(loc="left") for axes in figure.axes[:3]]
+    assert titles == [
+        "a cube that slides, as listed (ungated)",
+        "a cube that slides, as written (gated)",
+        "a cube that tumbles, as written (gated)",
+    ]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    for words in ("airborne energy ≤ 1.05 E₀", "apex ≤ 1.02 × the one before, from 0.1 m on"):
+        assert f"first pass: {words}" in labels
+        assert f"last fail: {words}" in labels
+
+
+def test_the_note_under_a_figure_says_what_was_run():
+    run = dataset("sliding", "as_listed", ground={"stiffness": 1e5, "damping": 0.3, "friction": 0.4})
+    assert number_format.describe(run) == (
+        "sliding, symplectic euler, 3,000 steps (ωh = 2.11); S = 10⁵ kg/s², D = 0.3 kg/s, μ = 0.4"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1e6, "10⁶"), (2.5e4, "2.5×10⁴"), (0.075, "0.075"), (0, "0"), (1e-6, "10⁻⁶"), (9999, "9999"), (1e-3, "0.001")],
+)
+def test_numbers_are_written_as_people_do(value, text):
+    assert number_format.readable(value) == text
+
+
+def test_an_energy_that_rises_is_seen(data):
+    """The axis holds all of both energies: nothing is cropped."""
+    figure = drawn("energy", data["posi"])
+    for axes, run in zip(figure.axes, data["posi"].values(), strict=True):
+        low, high = axes.get_ylim()
+        full = run.energy_paper + run.elastic_energy
+        assert low <= float(run.energy_paper.min())
+        assert high >= float(full.max())
+
+
+@pytest.mark.parametrize("title", ["$$", r"$\frac{1}{$ and $5", "a\x1b[2J\u202eb", "two\nlines"])
+def test_a_title_is_text_in_its_figure(title, tmp_path):
+    """Neither a formula, which may be none, nor a character that no SVG may hold."""
+    path = tmp_path / "x.svg"
+    figure = style.new_figure(title)
+    figure.savefig(path)
+    ElementTree.parse(path)
+    assert figure.get_suptitle() == title.replace("\n", " ").replace("\x1b", r"\x1b").replace("\u202e", r"\u202e")

@@ -1,0 +1,72 @@
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from stiffdice.study import catalogue, forecast, outputs
+from stiffdice.study import config as studies
+from stiffdice.sweep import partition
+
+
+@pytest.fixture
+def load(study_schema, monkeypatch):
+    monkeypatch.chdir(study_schema.parents[2])
+    return lambda name: studies.load(f"config/{name}.yaml", study_schema)
+
+
+@pytest.fixture
+def compiled(monkeypatch, tmp_path):
+    """A folder with the kernel of single runs, compiled."""
+    (tmp_path / "stiffdice_0").mkdir()
+    (tmp_path / "stiffdice_0/simulate._march-1.py311.0123456789abcdef.nbc").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+
+
+@pytest.mark.usefixtures("compiled")
+def test_every_job_takes_its_start_and_a_shard_its_predicted_work_besides(load):
+    study = load("quick")
+    (sweep,) = study.sweeps.values()
+    found = forecast.seconds(study)
+    assert list(found) == outputs.of(study)
+    assert all(0.5 < seconds < 20 for seconds in found.values())
+    for name, shard in partition.of(sweep).items():
+        (seconds,) = (taken for result, taken in found.items() if result.name == f"steps-needed/{name}")
+        assert seconds - shard.seconds * (0.25 if shard.round else 1) == pytest.approx(1.32)
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize(
+    ("name", "core_seconds"),  # of the processor, as `time` told them of whole runs
+    [("paper", 55), ("elastic", 219), ("stability", 431), ("extremes", 103), ("tradeoff", 228)],
+)
+def test_what_was_measured_is_foretold_within_a_factor_of_one_and_a_half(load, name, core_seconds):
+    assert 1 / 1.5 < sum(forecast.seconds(load(name)).values()) / core_seconds < 1.5
+
+
+def test_where_nothing_is_compiled_it_takes_longer(load, compiled, monkeypatch, tmp_path):
+    study = load("paper")
+    warm = forecast.seconds(study)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "nowhere"))
+    more = {result: seconds - warm[result] for result, seconds in forecast.seconds(study).items()}
+    assert {result.stage for result, seconds in more.items() if seconds} == {"trajectory", "shard"}
+    assert sum(more.values()) == pytest.approx(4 * 4 + 2 * 9)  # two models in two readings, and two laws
+
+
+def test_no_measure_is_forgotten():
+    assert set(catalogue.EXPERIMENTS) <= set(forecast._EXPERIMENT)
+    assert set(catalogue.TIMINGS) <= set(forecast._TIMING)
+
+
+def test_a_hundredth_of_a_second_tells_how_fast_this_machine_is():
+    forecast.slowness()
+    begun = time.process_time()
+    first, second = forecast.slowness(), forecast.slowness()
+    assert time.process_time() - begun < 0.05
+    assert 1 / 1.3 < first / second < 1.3
+    assert 0.1 < first < 30
+
+
+def test_jobs_beside_others_take_longer():
+    assert forecast.crowding(2) >= 1
+    assert forecast.crowding(10_000) < 1.1
