@@ -34,7 +34,8 @@ def project(tmp_path) -> Project:
 
 def job_of(part: Path) -> tuple[str, int, str]:
     """Return the Slurm job, the process and the node that write an unfinished file."""
-    *_, node, process, _ = part.name.split(".")
+    *_, place, process, _ = part.name.split(".")
+    node = place.partition("-")[0]  # what follows is its namespace
     environment = Path(f"/proc/{process}/environ").read_bytes().decode()
     return re.search(r"\0SLURM_JOB_ID=([0-9]+)\0", environment)[1], int(process), node
 

@@ -270,8 +270,8 @@ class _Files:
         else:
             dataset = self._opened(name, path)
             kind = "" if dataset is None else sanity.kind_of(dataset)
-        if kind in _ALONE:
-            self._report.note(_ALONE[kind])
+        if kind in sanity.NOT_SEEN:
+            self._report.note(sanity.NOT_SEEN[kind])
 
     def check_sweep(self, folder: str, files: Mapping[str, Path]) -> set[str]:
         """Check a sweep with its shards and its frontier, one against the other; return what was checked."""
@@ -283,7 +283,7 @@ class _Files:
             self._collect_again(whole, collected, {name: files[name] for name in names})
         else:
             names = []
-            self._report.note(_ALONE["sweep"])
+            self._report.note(sanity.NOT_SEEN["sweep"])
         frontier = self._opened(edges, files[edges]) if edges in files else None
         if collected is not None and frontier is not None:
             self._compare(edges, lambda: sweeps.same_as_found(frontier, collected))
@@ -384,15 +384,6 @@ class _Files:
             self._report.note(f"numbers in files of format {version} (they have no seal, so no change of them is seen)")
         self._report.fail(name, *(where + problem for problem in problems))
 
-
-# What of a file the checks of it alone cannot see, by its kind.
-_ALONE = {
-    "run": "motion of runs from state to state, touch-down phases and measures (a rebuild computes them again)",
-    "shard": "numbers of shards apart from their sweep",
-    "sweep": "numbers of sweeps and surveys apart from their shards",
-    "frontier": "numbers of frontiers apart from their sweep",
-    "experiment": "numbers of experiments and timings (no other file has them)",
-}
 
 # Files of these formats need not hold all that the checks look at.
 _BEFORE_SANITY = ("1.0", "1.1")

@@ -12,6 +12,15 @@ import xarray as xr
 from stiffdice.archive.consistency import runs, sweeps
 from stiffdice.errors import InputError
 
+# What of a file the checks here do not see, by its kind.
+NOT_SEEN = {
+    "run": "motion of runs from state to state, touch-down phases and measures (a rebuild computes them again)",
+    "shard": "numbers of shards apart from their sweep",
+    "sweep": "numbers of sweeps and surveys apart from their shards",
+    "frontier": "numbers of frontiers apart from their sweep",
+    "experiment": "numbers of experiments and timings (no other file has them)",
+}
+
 # By what a file must hold to be one; the first that fits.
 _KINDS = {
     "run": ({"time", "position", "kinetic_energy"}, runs.problems),
