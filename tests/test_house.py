@@ -144,7 +144,7 @@ def _gated_reaches""",
         ("Gated: _always}", "Gated: _always, Twice: _always}"),
     ],
     "integrators/batched_kernel.py": [
-        ("import LAWS, Gated", "import LAWS, Twice, Gated"),
+        ("import Gated", "import Twice, Gated"),
         ("Gated: _gated_push}", "Gated: _gated_push, Twice: _twice_push}"),
         (
             "# (law, depth, drag, stiffness)",

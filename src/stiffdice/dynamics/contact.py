@@ -50,11 +50,6 @@ def _ungated_reaches(clearance: float) -> bool:
 
 
 @njit
-def _ungated_acts(touching: Any, speed: float) -> bool:
-    return touching or speed < 0.0
-
-
-@njit
 def _gated_force(depth: float, speed: float, stiffness: float, damping: float) -> float:
     """As section 4.2 says: the same for a node below the ground, and nothing for any other."""
     if depth <= 0.0:
@@ -74,11 +69,6 @@ def _gated_reaches(clearance: float) -> bool:
     return clearance <= 0.0
 
 
-@njit
-def _gated_acts(touching: Any, speed: float) -> bool:
-    return bool(touching)
-
-
 # (law, depth, speed, stiffness, damping) -> the magnitude of the normal force on a node [N]. depth [m]: distance below
 # the ground, negative above it. speed [m/s]: along the outward normal.
 normal_force = by_tag({Ungated: _ungated_force, Gated: _gated_force})
@@ -89,10 +79,6 @@ normal_slopes = by_tag({Ungated: _ungated_slopes, Gated: _gated_slopes})
 
 # (law, clearance) -> whether the law can act on a body whose every node is at least `clearance` [m] above the ground.
 reaches = by_tag({Ungated: _ungated_reaches, Gated: _gated_reaches})
-
-# (law, touching, speed) -> whether the law can act on a body; touching: whether a node does; speed [m/s]: at least so
-# fast every node moves away from the ground.
-acts = by_tag({Ungated: _ungated_acts, Gated: _gated_acts})
 
 
 @njit

@@ -23,7 +23,7 @@ from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend, batch_loop, fast_forward, monitor
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria.apex import default_hop_height
-from stiffdice.simulation.criteria.energy import ceiling, finish
+from stiffdice.simulation.criteria.energy import finish
 from stiffdice.simulation.criteria.registry import MEMORY, limits_of, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.criteria.registry import start as criteria_start
@@ -205,13 +205,11 @@ def simulate(
             simulator, scene, model, physics, ensemble, watched, compared, *limits, samples, progress
         )
     else:
-        alone = every is not None or progress is not None or budget is not None or references is not None
-        left = count
-        grounded = bool(watched.sight["touched"].any())
-        if leaping and not (alone or grounded) and batch_loop.pays(scene, model, scheme, ensemble):
-            left = batch_loop.march(scene, model, physics, ensemble, watched, steps)
-        if left > 0:
-            _repeat(advance, None if progress is None else lambda: progress(watched.fraction(steps, h)))
+        together = None
+        if leaping and scheme == batch_loop.SCHEME:
+            ends = batch_loop.Limits(steps, most, every or 0)
+            together = batch_loop.start(scene, model, ensemble, watched, compared, samples, ends)
+        _repeat(together or advance, None if progress is None else lambda: progress(watched.fraction(steps, h)))
 
     _finish(physics, ensemble, watched.memory, watched.sight)
     found = values(watched.memory)
@@ -417,21 +415,9 @@ def _leap(
         return flown, flown, 0, 0
     if left <= 0:
         return 0, 0, 0, 0
-    held = seen.held
     skipped = fast_forward.skip(scheme, model, law, physics, state, seen, most)
-    most = min(most - skipped, left)
-    # Every step counts where the motion is compared, known by phases, has just come to rest, or goes on without ever
-    # having left the ground.
-    if (
-        compared
-        or (remembered.energy[3] > 0.0 and seen.still == 0.0)
-        or seen.held > held
-        or fast_forward.follows(scheme, model, physics, state, seen)
-    ):
-        most = 1
-    high, low = ceiling(remembered.energy), fast_forward.rest_of(model, law, physics, seen)
-    taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
-    return skipped + taken, 0, computed, evaluated
+    taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+    return skipped + taken, 0, taken, evaluated
 
 
 def _trajectory(

@@ -24,7 +24,6 @@ drift = tumbling.drift
 turn = tumbling.turn
 turns = tumbling.turns
 extent = tumbling.extent
-rises_only = tumbling.rises_only
 
 
 @njit

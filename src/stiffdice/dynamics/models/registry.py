@@ -40,8 +40,5 @@ turns = by_tag({type(module.TAG): module.turns for module in _MODULES.values()})
 # (model) -> whether the ground can act on the body.
 touches = by_tag({type(module.TAG): module.touches for module in _MODULES.values()})
 
-# (model) -> whether the body moves up and down only, on level ground, so that friction has nothing to act on.
-rises_only = by_tag({type(module.TAG): module.rises_only for module in _MODULES.values()})
-
 # (model, physics, state) -> how far below the centre a node can be in a free flight from this state on [m].
 extent = by_tag({type(module.TAG): module.extent for module in _MODULES.values()})

@@ -82,12 +82,6 @@ def touches() -> bool:
 
 
 @njit
-def rises_only() -> bool:
-    """Return that the body moves along the ground, too."""
-    return False
-
-
-@njit
 def extent(physics: Physics, state: Any) -> float:
     """Return how far below the centre the lowest node is, in a free flight, too [m]."""
     return lowest_of(physics, state)

@@ -115,12 +115,6 @@ def touches() -> bool:
 
 
 @njit
-def rises_only() -> bool:
-    """Return that the body moves along the ground, too."""
-    return False
-
-
-@njit
 def extent(physics: Physics, state: Any) -> float:
     """Return how far below the centre a node can come, however the cube turns [m]."""
     return physics.reach

@@ -53,9 +53,3 @@ def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
 def drift(physics: Physics, state: Any, h: float) -> None:
     """Advance the height by h [s] at the state's velocity (equation 7)."""
     state.position[2] += h * state.velocity[2]
-
-
-@njit
-def rises_only() -> bool:
-    """Return that the body moves up and down only."""
-    return True
