@@ -158,7 +158,9 @@ def test_one_step_is_the_listings_step_anywhere_on_the_way(contact, keys):
     states = batched(scene_of(contact, 1e-3, **keys), "tumbling", path[:-1], 1)
     for part in PARTS:
         size = np.abs(path[part]).max()
-        np.testing.assert_allclose(states[part], path[part][1:], rtol=0, atol=2e-14 * size, err_msg=part)
+        # Ungated, friction acts in the air, too, and amplifies round-off where a node's slip turns around.
+        within = 2e-14 if contact == "gated" else 1e-13
+        np.testing.assert_allclose(states[part], path[part][1:], rtol=0, atol=within * size, err_msg=part)
 
 
 def test_a_spin_of_any_rate_turns_the_cube_as_rodrigues_says():

@@ -415,9 +415,15 @@ def enter(axes: Array, state: Any, block: Array, lane: int) -> None:
 
 
 @njit
+def place_of(axes: Array, block: Array, lane: int) -> Vector:
+    """Return the place of a member in a lane along the world's axes [m]."""
+    return _to_world(axes, block, PLACE, lane)
+
+
+@njit
 def leave(model: Any, axes: Array, block: Array, lane: int, state: Any) -> None:
     """Put what a step changes of a member into its STATE record."""
-    state.position[0], state.position[1], state.position[2] = _to_world(axes, block, PLACE, lane)
+    state.position[0], state.position[1], state.position[2] = place_of(axes, block, lane)
     state.velocity[0], state.velocity[1], state.velocity[2] = _to_world(axes, block, VELOCITY, lane)
     if not turns(model):
         return

@@ -30,6 +30,7 @@ from stiffdice.scene.scene import Scene
 from stiffdice.simulation import fast_forward, monitor
 from stiffdice.simulation.criteria.registry import CRITERIA, open_of
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
+from stiffdice.simulation.reference import distance
 
 SCHEME = "symplectic_euler"
 
@@ -45,13 +46,13 @@ _WORK, _EVENT = 400_000, 10
 # Rows of a block below those of `batched_kernel.py`. Since the member's last event: steps, largest energy in the air
 # [J]. Of the last step: clearance [m], still: 1 if it changed nothing. Of the one before: speed, height, clearance;
 # and the speed of the one before that. What makes an event: due, after so many steps less one, limit [J], rest [m²/s²],
-# live: 1, or 0 for a lane nobody is in.
-DONE, WORST, CLEARANCE, STILL, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE = range(
-    batched_kernel.ROWS, batched_kernel.ROWS + 12
+# live: 1, or 0 for a lane nobody is in. seen: 1 if something else than due made one; most: steps until all is looked at.
+DONE, WORST, CLEARANCE, STILL, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE, SEEN, MOST = range(
+    batched_kernel.ROWS, batched_kernel.ROWS + 14
 )
-ROWS = batched_kernel.ROWS + 12
+ROWS = batched_kernel.ROWS + 14
 
-_ENERGY = list(CRITERIA).index("energy")
+_ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("trajectory")
 
 
 class Balance(NamedTuple):
@@ -125,10 +126,10 @@ def _run_on(task: Task, block: Array) -> int:
         swing = swing_square(e.omega, task.k.h, now + e.sag, new.velocity.z)
         settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
         size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
-        happens = (up ^ (clearance > 0.0)) | (done >= due) | (up & (energy > limit)) | (~up & settles)
-        happens = happens | ~(size < math.inf)
         unturned = batched_kernel.unturned(task.k, new)
-        happening = bits(live & (happens | unturned))
+        happens = (up ^ (clearance > 0.0)) | (up & (energy > limit)) | (~up & settles)
+        happens = happens | ~(size < math.inf) | unturned
+        happening = bits(live & (happens | (done >= due)))
         done = done + 1.0
         flying = where(up, max(worst, energy), worst)
         if happening != 0:
@@ -138,6 +139,7 @@ def _run_on(task: Task, block: Array) -> int:
             store(block, DONE, done)
             store(block, CLEARANCE, now)
             store(block, STILL, where(still, 1.0, 0.0))
+            store(block, SEEN, where(happens, 1.0, 0.0))
             store(block, WORST, where(happens, worst, flying))
             store(block, EARLIER, earlier)
             store(block, SPEED, body.velocity.z)
@@ -167,6 +169,24 @@ def _keep(task: Task, samples: States, state: Any, done: int) -> None:
     every = task.limits.every
     if every > 0 and done % every == 0:
         samples[done // every] = state
+
+
+@njit
+def _only_compared(
+    task: Task, axes: Array, block: Array, lane: int, state: Any, seen: Any, remembered: Any, reference: Any, done: int
+) -> bool:
+    """Compare the step that a member has just taken in a lane; return whether that is all there is to see in it."""
+    taken = block[DONE, lane]
+    time = seen.late + (done + int(taken)) * seen.step_size
+    if block[SEEN, lane] > 0.0 or taken >= block[MOST, lane] or not time < reference.horizon:
+        return False
+    state.position[0], state.position[1], state.position[2] = batched_kernel.place_of(axes, block, lane)
+    off = distance(reference, time, state) / task.physics.radius
+    if off > remembered.limits[_TRAJECTORY] and remembered.decided[_TRAJECTORY] == 0:
+        return False
+    remembered.trajectory[0] = max(remembered.trajectory[0], off)
+    block[DUE, lane] = taken
+    return True
 
 
 @njit
@@ -206,8 +226,7 @@ def _fast_forward(
     model, law, physics, moved = task.model, task.law, task.physics, False
     while done < task.limits.steps and open_of(remembered) > 0 and remembered.finite[0] == 0.0:
         most = _until_kept(task, done) - done
-        compared = reference.horizon >= seen.time
-        if compared:  # at least as often as the reference is known
+        if reference.horizon >= seen.time:  # at least as often as the reference is known
             most = min(most, 1 + int(reference.spacing / seen.step_size))
         flown = fast_forward.free_steps(model, law, physics, state, seen, most)
         if flown > 0:
@@ -221,12 +240,11 @@ def _fast_forward(
             break
         held = seen.held
         skipped = fast_forward.skip(task.scheme, model, law, physics, state, seen, most)
-        most = min(most - skipped, left)
-        # Every step counts where the motion is compared, known by phases, has just come to rest or left the ground, or
-        # goes on without ever having left it.
+        most = min(_until_kept(task, done) - done - skipped, left)
+        # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
+        # without ever having left it.
         if (
-            compared
-            or seen.flight == 1.0
+            seen.flight == 1.0
             or (remembered.energy[3] > 0.0 and seen.still == 0.0)
             or seen.held > held
             or fast_forward.follows(task.scheme, model, physics, state, seen)
@@ -239,14 +257,15 @@ def _fast_forward(
 
 
 @njit
-def _wait(task: Task, block: Array, lane: int, seen: Any, remembered: Any, most: int) -> None:
+def _wait(task: Task, block: Array, lane: int, seen: Any, remembered: Any, reference: Any, most: int) -> None:
     """Let a member go on in a lane for so many steps, or until something happens."""
-    block[REST, lane] = fast_forward.rest_of(task.model, task.law, task.physics, seen)
+    block[REST, lane] = fast_forward.rest_of(task.model, task.law, task.physics, seen) if most > 1 else -1.0
     block[LIMIT, lane] = math.inf
     if remembered.decided[_ENERGY] == 0 and remembered.limits[_ENERGY] < math.inf:
         above = (remembered.limits[_ENERGY] - 1.0) * remembered.energy[2]
         block[LIMIT, lane] = remembered.energy[1] + above
-    block[DONE, lane], block[DUE, lane], block[WORST, lane] = 0.0, most - 1.0, -math.inf
+    block[DONE, lane], block[MOST, lane], block[WORST, lane] = 0.0, most, -math.inf
+    block[DUE, lane] = 0.0 if reference.horizon >= seen.time else most - 1.0
     block[CLEARANCE, lane], block[SPEED, lane] = seen.clearance, seen.speed_before
 
 
@@ -279,10 +298,13 @@ def _march(
             if m >= 0:
                 if models.turns(task.model):
                     batched_kernel.turn(block, lane, task.k.h)
+                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
+                work += _EVENT
+                if _only_compared(task, axes, block, lane, state, seen, remembered, reference, steps_done[m]):
+                    continue
                 taken = int(block[DONE, lane])
                 steps_computed[m] += taken
-                work += taken + _EVENT
-                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
+                work += taken
                 done = _come_out(task, axes, block, lane, state, seen, remembered, reference, samples, steps_done[m])
                 left = task.limits.budget - steps_computed[m]
                 steps_done[m], most, moved = _fast_forward(
@@ -300,7 +322,7 @@ def _march(
             if most > 0:
                 if moved:
                     batched_kernel.enter(axes, ensemble[m], block, lane)
-                _wait(task, block, lane, sight[m], memory[m], most)
+                _wait(task, block, lane, sight[m], memory[m], references[m % len(references)], most)
         if inside.max() < 0:
             return -1
         if work > _WORK:
