@@ -12,9 +12,7 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.io.cf_enums import enum_attributes
-
-# The part before the dot changes when an older reader could not understand a file.
-FORMAT_VERSION = "1.3"
+from stiffdice.io.structure_check import FORMAT_VERSION
 
 # How much a reader may count on something.
 REQUIRED, RECOMMENDED, OPTIONAL = "required", "recommended", "optional"
