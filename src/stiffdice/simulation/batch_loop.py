@@ -46,7 +46,7 @@ _WORK, _EVENT = 400_000, 10
 # Rows of a block below those of `batched_kernel.py`. Since the member's last event: steps, largest energy in the air
 # [J]. Of the last step: clearance [m], still: 1 if it changed nothing. Of the one before: speed, height, clearance;
 # and the speed of the one before that. What makes an event: due, after so many steps less one, limit [J], rest [m²/s²],
-# live: 1, or 0 for a lane nobody is in. seen: 1 if something else than due made one; most: steps until all is looked at.
+# live: 1, or 0 for a lane nobody is in. seen: 1 if something else than due made one; most: steps until a whole look.
 DONE, WORST, CLEARANCE, STILL, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE, SEEN, MOST = range(
     batched_kernel.ROWS, batched_kernel.ROWS + 14
 )
