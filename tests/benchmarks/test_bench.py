@@ -200,7 +200,7 @@ def test_aims_are_ratios_of_a_round_and_say_whether_they_are_met():
         | {
             "mujoco_rollout_tumbling_gated": (2.5e-6, 0.0, 0, ()),
             "mujoco_rollout_vertical_gated": (1e-6, 0.0, 0, ()),
-            "ensemble_tumbling_gated": (9e-9, 0.0, 0, ()),
+            "ensemble_tumbling_gated": (9e-9, 0.0, 10, ()),
             "ensemble_vertical_gated": (1e-9, 0.0, 0, ()),
             "ensemble_sliding_ungated": (2e-9, 0.0, 10, ()),
             "help": (0.1, 0.0, 0, ()),
