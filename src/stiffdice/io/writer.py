@@ -33,12 +33,14 @@ def temporary_of(target: Path) -> Path:
     Removes what processes of this host that are gone left of the same file; those of other hosts, and of other
     containers of this one, cannot be asked.
     """
+    import psutil
+
     here = host.name()
     ours = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(here)}\.([0-9]+)\.part")
     with contextlib.suppress(OSError):  # a folder that cannot be read is told by who writes in it
         for entry in os.scandir(target.parent):
             found = ours.fullmatch(entry.name)
-            if found and not _is_alive(int(found[1])):
+            if found and not psutil.pid_exists(int(found[1])):
                 with contextlib.suppress(OSError):
                     Path(entry).unlink()
     return target.with_name(f".{target.name}.{here}.{os.getpid()}.part")
@@ -52,16 +54,6 @@ def clear(target: Path) -> None:
             if name.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
                     Path(entry).unlink()
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # another user's
-        return True
-    return True
 
 
 @contextlib.contextmanager
