@@ -9,8 +9,8 @@ from pathlib import Path
 
 from benchmarks import BENCHMARKS
 from benchmarks.run import bench
+from stiffdice.cli.common import name_of
 from stiffdice.cli.main import called
-from stiffdice.cli.options import name_of
 from stiffdice.cli.progress import notes
 from stiffdice.scene import validation
 

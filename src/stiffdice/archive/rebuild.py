@@ -284,4 +284,5 @@ def _compared(unpacked: Opened) -> Comparison:
     if made.resolve() != made:  # a link, to the archive's own perhaps
         made = unpacked.folder / _NOTHING
     made.mkdir(parents=True, exist_ok=True)
-    return replace(compare(archived, made), only_b=())
+    found = compare(archived, made)
+    return replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))

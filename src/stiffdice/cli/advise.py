@@ -5,16 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from stiffdice.cli.options import (
-    Commands,
-    add_changes,
-    add_command,
-    add_force,
-    add_json,
-    number,
-    scene_words,
-    target_of,
-)
+from stiffdice.cli import common
 from stiffdice.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -57,9 +48,9 @@ _VECTORS = ("position", "velocity", "spin")
 _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    advise = add_command(
+    advise = common.add_command(
         commands,
         "advise",
         _advise,
@@ -80,9 +71,9 @@ def add(commands: Commands) -> None:
         help="do it, and check the promise against a run of twice the cost and another method",
     )
     advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
-    add_json(advise)
-    add_force(advise)
-    add_changes(advise)
+    common.add_json(advise)
+    common.add_force(advise)
+    common.add_changes(advise)
     scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
     either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
     for name, (_, text) in _KEYS.items():
@@ -120,12 +111,12 @@ def _advise(options: argparse.Namespace) -> int:
         scene = scenes.changed({}, changes, options.preset)
     else:
         scene = scenes.load(options.scene, changes, options.preset)
-    horizon = None if options.horizon is None else number("--horizon", options.horizon, "s")
+    horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
     if options.output is not None and not options.run:
         raise InputError("-o: a file is written with --run only")
     target = None
     if options.output is not None:
-        target = target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
+        target = common.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
@@ -152,7 +143,7 @@ def _advise(options: argparse.Namespace) -> int:
     else:
         for line in scene.derived:
             print(line)
-        print(advice_text.as_text(given, scene_words(options, changes) if options.scene else []))
+        print(advice_text.as_text(given, common.scene_words(options, changes) if options.scene else []))
         if check is not None:
             print("\n" + advice_text.check_as_text(check))
             if target is not None:

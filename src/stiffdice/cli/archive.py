@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiffdice.cli.options import Commands, add_command, add_force, target_of
+from stiffdice.cli import common
 
 if TYPE_CHECKING:
     from stiffdice.archive.sizes import Sizes
@@ -23,16 +23,16 @@ each. To be called in the project's folder.
 """
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    archive = add_command(
+    archive = common.add_command(
         commands, "archive", _archive, "pack a finished study with all that made it into one file", EXAMPLES
     )
     archive.add_argument("study", metavar="STUDY", help="the name of a file in config/, without .yaml")
     archive.add_argument(
         "-o", dest="output", metavar="FILE.zip", help="default: results/archives/STUDY-VERSION.crate.zip"
     )
-    add_force(archive)
+    common.add_force(archive)
     archive.add_argument("--agent", metavar="NAME", help="who ran the study, if the archive is to say so")
     archive.add_argument("--json", action="store_true", help="sizes for programs")
 
@@ -55,7 +55,7 @@ def _archive(options: argparse.Namespace) -> None:
     study = studies.load(root / "config" / f"{options.study}.yaml", schema)
     target = pack.default_target(study, root, __version__)
     if options.output:
-        target = target_of(options.output, options.force, _is_archive)
+        target = common.target_of(options.output, options.force, _is_archive)
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
     packed = pack.pack(study, root, target, options.agent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from stiffdice.cli.options import Commands, add_command
+from stiffdice.cli import common
 
 EXAMPLES = """\
 examples:
@@ -23,9 +23,11 @@ are left out, unless --all is given.
 """
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    diff = add_command(commands, "diff", _diff, "say whether two results differ, where, and by how much", EXAMPLES)
+    diff = common.add_command(
+        commands, "diff", _diff, "say whether two results differ, where, and by how much", EXAMPLES
+    )
     diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
     diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
     diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from stiffdice.cli.options import Commands, add_command, add_json
+from stiffdice.cli import common
 
 EXAMPLES = """\
 examples:
@@ -16,13 +16,13 @@ examples:
 """
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    inspect = add_command(
+    inspect = common.add_command(
         commands, "inspect", _inspect, "say what a file holds: its verdict, its scene, its variables", EXAMPLES
     )
     inspect.add_argument("file", metavar="FILE.h5")
-    add_json(inspect)
+    common.add_json(inspect)
 
 
 def _inspect(options: argparse.Namespace) -> None:

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli.options import Commands, add_command, name_of, whole
+from stiffdice.cli import common
 
 if TYPE_CHECKING:
     from stiffdice.archive.rebuild import Opened
@@ -32,9 +32,9 @@ differ, 2 if the archive cannot be trusted, is not to be run, or its run failed.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    rebuild = add_command(
+    rebuild = common.add_command(
         commands, "rebuild", _rebuild, "make an archive again from its own content, and compare", EXAMPLES
     )
     rebuild.add_argument("archive", metavar="ARCHIVE")
@@ -48,8 +48,8 @@ def add(commands: Commands) -> None:
 
 def _rebuild(options: argparse.Namespace) -> int:
     if options.output is not None:
-        name_of("-o", options.output)
-    cores = whole("--cores", options.cores)
+        common.name_of("-o", options.output)
+    cores = common.whole("--cores", options.cores)
 
     # This takes about a second to import; bad input is told before.
     from stiffdice.archive.rebuild import opened, rebuild, way_of

@@ -6,17 +6,7 @@ import argparse
 import shlex
 import sys
 
-from stiffdice.cli.options import (
-    Commands,
-    add_changes,
-    add_command,
-    add_force,
-    number,
-    scene_words,
-    steps_of,
-    target_of,
-    whole,
-)
+from stiffdice.cli import common
 from stiffdice.errors import printable
 
 EXAMPLES = """\
@@ -32,9 +22,9 @@ its verdict; 2 for bad input.
 """
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    run = add_command(
+    run = common.add_command(
         commands, "run", _run, "run one scene and store its trajectory and verdict in one HDF5 file", EXAMPLES
     )
     run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
@@ -82,8 +72,8 @@ def add(commands: Commands) -> None:
         action="store_true",
         help="book where the energy goes, for every bounce and for the run (takes some times as long)",
     )
-    add_force(run)
-    add_changes(run)
+    common.add_force(run)
+    common.add_changes(run)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -92,10 +82,10 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.scene import validation
 
     scene = scenes.load(options.scene, options.overrides, options.preset)
-    steps, note = whole("--steps", options.steps), ""
+    steps, note = common.whole("--steps", options.steps), ""
     if options.dt is not None:
-        steps, note = steps_of(options.dt, scene.duration)
-    target = target_of(options.output, options.force, seal.is_sealed, options.scene)
+        steps, note = common.steps_of(options.dt, scene.duration)
+    target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
 
     # These take about a second to import; bad input is told before.
     from stiffdice.cli.progress import progress
@@ -114,10 +104,10 @@ def _run(options: argparse.Namespace) -> None:
     every = (
         default_every(steps)
         if options.every is None
-        else validation.count("every", whole("--every", options.every), at_most=steps)
+        else validation.count("every", common.whole("--every", options.every), at_most=steps)
     )
-    tolerance = schemes.TOLERANCE if options.tolerance is None else number("--tolerance", options.tolerance, "1")
-    budget = None if options.budget is None else whole("--budget", options.budget)
+    tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
+    budget = None if options.budget is None else common.whole("--budget", options.budget)
     method = scheme if options.simulator == backend.OURS else ""
     model, _ = model_selection.chosen(options.model, [scene], scene.duration / steps)
     backend.check_fit(options.simulator, scheme, scene, model)
@@ -144,5 +134,5 @@ def _run(options: argparse.Namespace) -> None:
         print(printable(line))
     if options.model == model_selection.AUTO:
         print(run.model_reason)
-    advise = shlex.join(["stiffdice", "advise", *scene_words(options, options.overrides), "--error", "1%"])
+    advise = shlex.join(["stiffdice", "advise", *common.scene_words(options, options.overrides), "--error", "1%"])
     print("\n".join(map(printable, run_page.lines(run, str(target), advise))))

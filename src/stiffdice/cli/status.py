@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiffdice.cli.options import Commands, add_command, add_json
+from stiffdice.cli import common
 
 if TYPE_CHECKING:
     from stiffdice.study.status import Status
@@ -32,9 +32,9 @@ SECONDS = 2.0
 QUIET = 4
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    status = add_command(
+    status = common.add_command(
         commands,
         "status",
         _status,
@@ -44,7 +44,7 @@ def add(commands: Commands) -> None:
     status.add_argument("study", metavar="STUDY", nargs="?", help="a file in config/, without .yaml")
     status.add_argument("--watch", action="store_true", help="look every two seconds, until the run has ended")
     status.add_argument("--cores", type=int, metavar="N", help="for the time left (default: as many as are at work)")
-    add_json(status)
+    common.add_json(status)
 
 
 def _status(options: argparse.Namespace) -> int:

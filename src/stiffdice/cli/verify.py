@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from stiffdice import __version__
-from stiffdice.cli.options import Commands, add_command, add_json
+from stiffdice.cli import common
 
 EXAMPLES = f"""\
 examples:
@@ -20,9 +20,9 @@ at all. docs/verify.md says what is checked, and how to check it without stiffdi
 """
 
 
-def add(commands: Commands) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    verify = add_command(
+    verify = common.add_command(
         commands,
         "verify",
         _verify,
@@ -30,7 +30,7 @@ def add(commands: Commands) -> None:
         EXAMPLES,
     )
     verify.add_argument("path", metavar="ARCHIVE|FOLDER", help="an archive, an unpacked one, results, or an .h5 file")
-    add_json(verify)
+    common.add_json(verify)
 
 
 def _verify(options: argparse.Namespace) -> int:
