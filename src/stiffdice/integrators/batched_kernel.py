@@ -76,11 +76,11 @@ class ThirtyTwo(NamedTuple):
     """The tag of blocks of 32 members."""
 
 
-WIDTHS = {Alone: 1, Sixteen: 16, ThirtyTwo: 32}
+WIDTHS: dict[type, int] = {Alone: 1, Sixteen: 16, ThirtyTwo: 32}
 
 # Members side by side: enough for the vector units to have always something to do that does not wait for the step
 # before, and not more than registers and the stores behind them hold.
-ABREAST = {"vertical": ThirtyTwo(), "sliding": ThirtyTwo(), "tumbling": Sixteen()}
+ABREAST: dict[str, Any] = {"vertical": ThirtyTwo(), "sliding": ThirtyTwo(), "tumbling": Sixteen()}
 
 
 class Flat(NamedTuple):
