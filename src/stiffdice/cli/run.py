@@ -131,8 +131,8 @@ def _run(options: argparse.Namespace) -> None:
     dataset = run_dataset(run)
     if options.ledger:
         done = int(run.steps_done[0])
-        books = energy_budget.keep(scene, model=run.model, scheme=run.scheme, steps=steps, budget=done)
-        dataset = dataset.assign(energy_budget.variables(books))
+        ledger = energy_budget.ledger(scene, model=run.model, scheme=run.scheme, steps=steps, budget=done)
+        dataset = dataset.assign(ledger.data_vars)
     write_dataset(dataset, target)
     for line in filter(None, [*scene.derived, note]):
         print(printable(line))

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.energy import energies, mechanical
-from stiffdice.dynamics.state import STATE, Array, Ensemble, Physics, States, start_of
+from stiffdice.dynamics.state import Array, Ensemble, Physics, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
@@ -28,13 +28,11 @@ from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.criteria.registry import start as criteria_start
 from stiffdice.simulation.monitor import SIGHT
 from stiffdice.simulation.reference import none
-from stiffdice.simulation.task import Task, Watched
+from stiffdice.simulation.task import Task, Watched, room_for
 
 # Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
 # of a second.
 _WORK = 200_000
-
-LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
 
 @dataclass(frozen=True)
@@ -186,7 +184,7 @@ def _task(
         launches.copy(),
         Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64)),
         none() if references is None else references,
-        _room_for(setup.steps, every),
+        room_for(setup.steps, every),
     )
     memory, sight = task.watched[:2]
     memory["limits"] = limits_of(stop or {})
@@ -194,16 +192,6 @@ def _task(
     h, lag = setup.step_size, setup.lag
     _begin(*task.tags, task.physics, task.ensemble, memory, sight, h, setup.steps, late, lag, task.hop_height)
     return task
-
-
-def _room_for(steps: int, every: int | None) -> States:
-    count = 0 if every is None else steps // every + 1
-    if count > LARGEST_TRAJECTORY:
-        raise InputError(
-            f"every = {every}: would keep {count} samples ({count * STATE.itemsize / 1e9:.1f} GB); "
-            f"allowed is {math.ceil(steps / LARGEST_TRAJECTORY)} or more"
-        )
-    return np.zeros(count, STATE)
 
 
 def _advance(task: Task, leaping: bool, together: bool, progress: Callable[[float], None] | None) -> None:
@@ -273,7 +261,8 @@ def _trajectory(task: Task) -> Trajectory:
     if setup.simulator == backend.OURS:
         whole = mechanical(*task.tags, physics, state, setup.lag * setup.step_size)
     time = step / setup.steps * setup.scene.duration
-    return Trajectory(step, time, state, *energies(physics, state), whole)
+    kinetic, potential, elastic = energies(physics, state)
+    return Trajectory(step, time, state, kinetic, potential, elastic, whole)
 
 
 @njit(cache=True)

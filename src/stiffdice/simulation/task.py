@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,8 +10,11 @@ import numpy.typing as npt
 
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import Array, Physics, States, physics_of
+from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
+from stiffdice.errors import InputError
 from stiffdice.simulation.backend import Setup
+
+LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
 
 class Watched(NamedTuple):
@@ -65,3 +69,14 @@ class Task(NamedTuple):
     def physics(self) -> Physics:
         """The numbers of the scene."""
         return physics_of(self.setup.scene)
+
+
+def room_for(steps: int, every: int | None) -> States:
+    """Return room for every K-th state of a run and the launch; raises InputError where that is too large to hold."""
+    count = 0 if every is None else steps // every + 1
+    if count > LARGEST_TRAJECTORY:
+        raise InputError(
+            f"every = {every}: would keep {count} samples ({count * STATE.itemsize / 1e9:.1f} GB); "
+            f"allowed is {math.ceil(steps / LARGEST_TRAJECTORY)} or more"
+        )
+    return np.zeros(count, STATE)

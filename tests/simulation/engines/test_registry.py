@@ -125,11 +125,12 @@ def test_a_run_past_its_budget_is_undecided():
 
 
 @pytest.mark.parametrize("engine", [*TRANSCRIPTIONS, "scipy"])
-def test_a_run_that_fails_is_a_result(engine):
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+def test_a_run_that_fails_is_a_result(engine, model):
     """What leaves the range of doubles, or makes LSODA give up, ends with a verdict."""
     scene = from_mapping({"cube": {"mass": 1e-9}, "ground": {"stiffness": 1e308}}, "as_written")
-    run = simulate(scene, model="sliding", simulator=engine, steps=60)
-    ours = simulate(scene, model="sliding", steps=60)
+    run = simulate(scene, model=model, simulator=engine, steps=60)
+    ours = simulate(scene, model=model, steps=60)
     assert ours.verdict == [Verdict.LEFT_NUMERIC_RANGE]
     assert run.verdict == ours.verdict
     assert run.steps_done <= 60

@@ -76,6 +76,8 @@ def _rotated(nodes: Array, rotation: Array) -> Array:
     angle = math.hypot(*rotation)
     if angle == 0.0:
         return nodes
+    if not math.isfinite(angle):
+        return np.full_like(nodes, np.nan)
     axis = rotation / angle
     along = (nodes @ axis)[:, None] * axis
     return np.asarray(along + math.cos(angle) * (nodes - along) + math.sin(angle) * _cross(axis, nodes))
