@@ -18,19 +18,18 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS, swing_square
+from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
-from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.simd import bits, store, where
-from stiffdice.dynamics.state import TOUCHING, Array, Physics, States, physics_of
+from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
 from stiffdice.integrators import batched_kernel
 from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.batched_kernel import Alone, Body, Numbers, Vector, dot, inlined, row_of
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation import fast_forward, monitor
 from stiffdice.simulation.criteria.registry import CRITERIA, open_of
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.reference import distance
+from stiffdice.simulation.task import Task
 
 SCHEME = "symplectic_euler"
 
@@ -79,7 +78,7 @@ class Limits(NamedTuple):
     every: int
 
 
-class Task(NamedTuple):
+class Common(NamedTuple):
     """What is the same of all members; the first five are tags."""
 
     scheme: Any
@@ -111,22 +110,22 @@ def _energy(e: Balance, body: Body) -> Any:
 
 
 @inlined
-def _run_on(task: Task, block: Array) -> int:
+def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
-    width, e = task.width, task.e
+    width, e = common.width, common.e
     body = batched_kernel.read(width, block)
     done, worst, clearance = row_of(width, block, DONE), row_of(width, block, WORST), row_of(width, block, CLEARANCE)
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
-        new = batched_kernel.step(task.model, task.posture, task.law, task.k, body)
+        new = batched_kernel.step(common.model, common.posture, common.law, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         energy = _energy(e, new)
         up = now > 0.0
-        swing = swing_square(e.omega, task.k.h, now + e.sag, new.velocity.z)
+        swing = swing_square(e.omega, common.k.h, now + e.sag, new.velocity.z)
         settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
         size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
-        unturned = batched_kernel.unturned(task.k, new)
+        unturned = batched_kernel.unturned(common.k, new)
         happens = (up ^ (clearance > 0.0)) | (up & (energy > limit)) | (~up & settles)
         happens = happens | ~(size < math.inf) | unturned
         happening = bits(live & (happens | (done >= due)))
@@ -150,30 +149,38 @@ def _run_on(task: Task, block: Array) -> int:
 
 
 @njit
-def _show(task: Task, state: Any, seen: Any, remembered: Any, reference: Any, step: int, flown: int) -> bool:
+def _show(common: Common, state: Any, seen: Any, remembered: Any, reference: Any, step: int, flown: int) -> bool:
     """Show a step to all who watch; return whether every number is in range."""
-    monitor.observe(seen, task.physics, state, step, flown)
-    criteria_observe(remembered, step, seen, task.model, task.law, task.physics, state, reference)
+    monitor.observe(seen, common.physics, state, step, flown)
+    criteria_observe(remembered, step, seen, common.model, common.law, common.physics, state, reference)
     return remembered.finite[0] == 0.0
 
 
 @njit
-def _until_kept(task: Task, done: int) -> int:
+def _until_kept(common: Common, done: int) -> int:
     """Return the next step whose state is kept, or the last."""
-    steps, _, every = task.limits
+    steps, _, every = common.limits
     return min(steps, (done // every + 1) * every) if every > 0 else steps
 
 
 @njit
-def _keep(task: Task, samples: States, state: Any, done: int) -> None:
-    every = task.limits.every
+def _keep(common: Common, samples: States, state: Any, done: int) -> None:
+    every = common.limits.every
     if every > 0 and done % every == 0:
         samples[done // every] = state
 
 
 @njit
 def _only_compared(
-    task: Task, axes: Array, block: Array, lane: int, state: Any, seen: Any, remembered: Any, reference: Any, done: int
+    common: Common,
+    axes: Array,
+    block: Array,
+    lane: int,
+    state: Any,
+    seen: Any,
+    remembered: Any,
+    reference: Any,
+    done: int,
 ) -> bool:
     """Compare the step that a member has just taken in a lane; return whether that is all there is to see in it."""
     taken = block[DONE, lane]
@@ -181,7 +188,7 @@ def _only_compared(
     if block[SEEN, lane] > 0.0 or taken >= block[MOST, lane] or not time < reference.horizon:
         return False
     state.position[0], state.position[1], state.position[2] = batched_kernel.place_of(axes, block, lane)
-    off = distance(reference, time, state) / task.physics.radius
+    off = distance(reference, time, state) / common.physics.radius
     if off > remembered.limits[_TRAJECTORY] and remembered.decided[_TRAJECTORY] == 0:
         return False
     remembered.trajectory[0] = max(remembered.trajectory[0], off)
@@ -191,7 +198,7 @@ def _only_compared(
 
 @njit
 def _come_out(
-    task: Task,
+    common: Common,
     axes: Array,
     block: Array,
     lane: int,
@@ -203,7 +210,7 @@ def _come_out(
     done: int,
 ) -> int:
     """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
-    batched_kernel.leave(task.model, axes, block, lane, state)
+    batched_kernel.leave(common.model, axes, block, lane, state)
     seen.speed, seen.height, seen.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     seen.speed_before = block[EARLIER, lane]
     ratio = 1.0 + (block[WORST, lane] - remembered.energy[1]) / remembered.energy[2]
@@ -211,43 +218,43 @@ def _come_out(
     step = done + int(block[DONE, lane])
     every_counts = reference.horizon >= seen.time or (remembered.energy[3] > 0.0 and seen.still == 0.0)
     if block[STILL, lane] > 0.0 and seen.flight == 0.0 and not every_counts:
-        step = _until_kept(task, done)  # the others would not change anything, either
-    if not _show(task, state, seen, remembered, reference, step, 0):
+        step = _until_kept(common, done)  # the others would not change anything, either
+    if not _show(common, state, seen, remembered, reference, step, 0):
         return step - 1
-    _keep(task, samples, state, step)
+    _keep(common, samples, state, step)
     return step
 
 
 @njit
 def _fast_forward(
-    task: Task, state: Any, seen: Any, remembered: Any, reference: Any, samples: States, done: int, left: int
+    common: Common, state: Any, seen: Any, remembered: Any, reference: Any, samples: States, done: int, left: int
 ) -> tuple[int, int, bool]:
     """Take at once what can be; return the steps done, those to take in a lane, 0 at the end, and if any were taken."""
-    model, law, physics, moved = task.model, task.law, task.physics, False
-    while done < task.limits.steps and open_of(remembered) > 0 and remembered.finite[0] == 0.0:
-        most = _until_kept(task, done) - done
+    model, law, physics, moved = common.model, common.law, common.physics, False
+    while done < common.limits.steps and open_of(remembered) > 0 and remembered.finite[0] == 0.0:
+        most = _until_kept(common, done) - done
         if reference.horizon >= seen.time:  # at least as often as the reference is known
             most = min(most, 1 + int(reference.spacing / seen.step_size))
         flown = fast_forward.free_steps(model, law, physics, state, seen, most)
         if flown > 0:
-            schemes.flight(task.scheme, model, physics, state, seen.step_size, flown)
+            schemes.flight(common.scheme, model, physics, state, seen.step_size, flown)
             moved = True
-            if _show(task, state, seen, remembered, reference, done + flown, flown):
+            if _show(common, state, seen, remembered, reference, done + flown, flown):
                 done += flown
-                _keep(task, samples, state, done)
+                _keep(common, samples, state, done)
             continue
         if left <= 0:
             break
         held = seen.held
-        skipped = fast_forward.skip(task.scheme, model, law, physics, state, seen, most)
-        most = min(_until_kept(task, done) - done - skipped, left)
+        skipped = fast_forward.skip(common.scheme, model, law, physics, state, seen, most)
+        most = min(_until_kept(common, done) - done - skipped, left)
         # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
         # without ever having left it.
         if (
             seen.flight == 1.0
             or (remembered.energy[3] > 0.0 and seen.still == 0.0)
             or seen.held > held
-            or fast_forward.follows(task.scheme, model, physics, state, seen)
+            or fast_forward.follows(common.scheme, model, physics, state, seen)
         ):
             most = 1
         elif seen.flight > 0.0 and fast_forward.may_fly(law, model, seen):
@@ -257,9 +264,9 @@ def _fast_forward(
 
 
 @njit
-def _wait(task: Task, block: Array, lane: int, seen: Any, remembered: Any, reference: Any, most: int) -> None:
+def _wait(common: Common, block: Array, lane: int, seen: Any, remembered: Any, reference: Any, most: int) -> None:
     """Let a member go on in a lane for so many steps, or until something happens."""
-    block[REST, lane] = fast_forward.rest_of(task.model, task.law, task.physics, seen) if most > 1 else -1.0
+    block[REST, lane] = fast_forward.rest_of(common.model, common.law, common.physics, seen) if most > 1 else -1.0
     block[LIMIT, lane] = math.inf
     if remembered.decided[_ENERGY] == 0 and remembered.limits[_ENERGY] < math.inf:
         above = (remembered.limits[_ENERGY] - 1.0) * remembered.energy[2]
@@ -271,7 +278,7 @@ def _wait(task: Task, block: Array, lane: int, seen: Any, remembered: Any, refer
 
 @njit(cache=True, nogil=True)
 def _march(
-    task: Task,
+    common: Common,
     axes: Array,
     ensemble: States,
     memory: npt.NDArray[np.void],
@@ -296,71 +303,66 @@ def _march(
                 continue
             m, most, moved = inside[lane], 0, False
             if m >= 0:
-                if models.turns(task.model):
-                    batched_kernel.turn(block, lane, task.k.h)
+                if models.turns(common.model):
+                    batched_kernel.turn(block, lane, common.k.h)
                 state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
                 work += _EVENT
-                if _only_compared(task, axes, block, lane, state, seen, remembered, reference, steps_done[m]):
+                if _only_compared(common, axes, block, lane, state, seen, remembered, reference, steps_done[m]):
                     continue
                 taken = int(block[DONE, lane])
                 steps_computed[m] += taken
                 work += taken
-                done = _come_out(task, axes, block, lane, state, seen, remembered, reference, samples, steps_done[m])
-                left = task.limits.budget - steps_computed[m]
+                done = _come_out(common, axes, block, lane, state, seen, remembered, reference, samples, steps_done[m])
+                left = common.limits.budget - steps_computed[m]
                 steps_done[m], most, moved = _fast_forward(
-                    task, state, seen, remembered, reference, samples, done, left
+                    common, state, seen, remembered, reference, samples, done, left
                 )
             while most == 0 and waiting < len(ensemble):
                 m, moved = waiting, True
                 waiting += 1
                 state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
                 steps_done[m], most, _ = _fast_forward(
-                    task, state, seen, remembered, reference, samples, steps_done[m], task.limits.budget
+                    common, state, seen, remembered, reference, samples, steps_done[m], common.limits.budget
                 )
             inside[lane] = m if most > 0 else -1
             block[LIVE, lane] = 1.0 if most > 0 else 0.0
             if most > 0:
                 if moved:
                     batched_kernel.enter(axes, ensemble[m], block, lane)
-                _wait(task, block, lane, sight[m], memory[m], references[m % len(references)], most)
+                _wait(common, block, lane, sight[m], memory[m], references[m % len(references)], most)
         if inside.max() < 0:
             return -1
         if work > _WORK:
             return max(waiting, 1)
-        happening = _run_on(task, block)
+        happening = _run_on(common, block)
 
 
-def start(
-    scene: Scene,
-    model: str,
-    ensemble: States,
-    watched: Any,
-    references: npt.NDArray[np.void],
-    samples: States,
-    limits: Limits,
-) -> Callable[[], bool] | None:
-    """Return what advances all members for some time and tells whether there is more to do, as `simulate` wants it.
+def start(task: Task) -> Callable[[], bool] | None:
+    """Return what advances all members for some time and tells whether there is more to do.
 
-    watched: what `simulate` keeps of them, begun. None for a model in which the ground does not act, and where numbers
-    leave the range of doubles before the first step.
+    None for another scheme, a model in which the ground does not act, and where numbers leave the range of doubles
+    before the first step.
     """
-    if model not in TOUCHING:
+    setup, physics, watched = task.setup, task.physics, task.watched
+    scene, model = setup.scene, setup.model
+    if setup.scheme != SCHEME or model not in TOUCHING:
         return None
-    physics, axes, h = physics_of(scene), batched_kernel.axes_of(scene), scene.duration / limits.steps
+    axes, h = batched_kernel.axes_of(scene), setup.step_size
     k, e = batched_kernel.numbers_of(scene, h), _balance(physics, axes, h, watched.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
-    width = Alone() if len(ensemble) < FEWEST else batched_kernel.ABREAST[model]
-    posture = batched_kernel.posture_of(scene, model, ensemble)
-    tags = schemes.SCHEMES[SCHEME], width, MODELS[model], posture, LAWS[scene.ground.contact]
-    task = Task(*tags, k, e, physics, limits)
+    width = Alone() if len(task.ensemble) < FEWEST else batched_kernel.ABREAST[model]
+    posture = batched_kernel.posture_of(scene, model, task.ensemble)
+    limits = Limits(setup.steps, task.budget, task.every)
+    common = Common(schemes.SCHEMES[SCHEME], width, task.tags[0], posture, task.tags[1], k, e, physics, limits)
     lanes = batched_kernel.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
     waiting = 0
 
     def advance() -> bool:
         nonlocal waiting
-        waiting = _march(task, axes, ensemble, *watched[:4], references, samples, block, inside, waiting)
+        members = task.ensemble, *watched[:4], task.references, task.samples
+        waiting = _march(common, axes, *members, block, inside, waiting)
         watched.evaluations[:] = watched.steps_computed
         return waiting > 0
 
