@@ -10,7 +10,8 @@ import numpy as np
 from benchmarks.case import Case, Effort, Missing
 from benchmarks.scenes import STEP_SIZE, scene_of
 from stiffdice.dynamics.state import Ensemble
-from stiffdice.integrators import registry as schemes
+from stiffdice.errors import NotInstalledError
+from stiffdice.simulation.engines.registry import adapter_of
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.run import simulate
 
@@ -66,9 +67,9 @@ def _rollout(model: str, members: Ensemble, steps: int, effort: Effort) -> Case 
     """Return MuJoCo's own loop over members, which keeps every state, for the first part of their flight."""
     name, scene = f"mujoco_rollout_{model}_gated", scene_of("gated", steps)
     try:
-        from stiffdice.simulation.engines import mujoco as adapter
-    except ImportError as error:
-        return Missing(name, f"MuJoCo cannot be loaded: {str(error).splitlines()[0]}")
+        adapter = adapter_of("mujoco")
+    except NotInstalledError as error:
+        return Missing(name, f"MuJoCo: {str(error).splitlines()[0]}")
     count = len(members.launches)
     return Case(
         name,
@@ -78,17 +79,14 @@ def _rollout(model: str, members: Ensemble, steps: int, effort: Effort) -> Case 
         lambda: _rolling(adapter, scene, model, members, steps),
         effort.slow,
         "a general engine: collisions are looked for and a solver is called every step",
-        version=adapter.versions(),
+        version=adapter.version(),
     )
 
 
 def _rolling(adapter: Any, scene: Any, model: str, members: Ensemble, steps: int) -> Callable[[], object]:
     from mujoco import MjData, mj_getState, mj_stateSize, mjtState, rollout
 
-    standing = [
-        adapter.start(scene, model, members.launches[k : k + 1], STEP_SIZE, schemes.TOLERANCE)
-        for k in range(len(members.launches))
-    ]
+    standing = [adapter(scene, model, members.launches[k : k + 1], STEP_SIZE) for k in range(len(members.launches))]
     models, kind = [engine._model for engine in standing], mjtState.mjSTATE_FULLPHYSICS
     states = np.empty((len(standing), mj_stateSize(models[0], kind)))
     for engine, state in zip(standing, states, strict=True):
