@@ -79,8 +79,8 @@ types: install  ## check types (mypy)
 
 check: lint types test  ## all of the above
 
-docs: install  ## write docs/api.md from the docstrings of the public names
-	@$(BIN)/python docs/make_api.py
+docs: install  ## write docs/api.md from the docstrings of the public names, the tables of docs/FORMAT.md from the schema
+	@$(BIN)/python docs/make_api.py && $(BIN)/python docs/make_format.py
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
 	@for name in build requirements engines; do \
