@@ -1,4 +1,4 @@
-"""Other people's engines on the same throw, one step of 10⁻⁴ s after another, by their adapters."""
+"""Other people's engines on the same throw, one step of 10⁻⁴ s after another, by `stiffdice.simulation.engines`."""
 
 from __future__ import annotations
 
