@@ -21,8 +21,9 @@ def engines_note(data: Iterable[xr.Dataset]) -> str:
     methods = {name for found in data for name in meanings_of(found.method)}
     if not methods & set(ENGINES):
         return ""
-    loaded = {PEERS[name].load for name in methods if name in PEERS}
-    missing = [engine.name for engine in ENGINES.values() if engine.load not in loaded]
+    # All of SciPy's solvers are one package, and so are not missing beside each other.
+    used = {PEERS[name].needs for name in methods if name in PEERS}
+    missing = [engine.name for engine in ENGINES.values() if engine.needs not in used]
     versions = dict.fromkeys(
         part for found in data for part in str(found.attrs.get("engine_versions", "")).split("; ") if part
     )
