@@ -154,8 +154,7 @@ def _heights(scene: Scene) -> Array:
 
 def _along(scene: Scene, vector: validation.Vector) -> float:
     """Return the part of a vector along the ground's normal."""
-    nx, ny, nz = scene.ground.normal
-    return nx * vector[0] + ny * vector[1] + nz * vector[2]
+    return float(along(np.array(vector), scene.ground.normal))
 
 
 def _clears(scene: Scene, longest_step: float) -> bool:

@@ -30,10 +30,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of, normal_force, normal_slopes, reaches, speed_of
+from stiffdice.dynamics.contact import (
+    height_of,
+    node_velocity,
+    normal_force,
+    normal_slopes,
+    reaches,
+    speed_of,
+    split,
+    upward,
+)
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
-from stiffdice.integrators import free_flight
+from stiffdice.integrators.free_flight import scaled
+from stiffdice.integrators.linear_equations import factorise, solve
 
 
 class ImplicitEuler(NamedTuple):
@@ -64,42 +74,11 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.kick(model, physics, state, weight, h)
     models.drift(model, physics, state, h)
     change = _solved(model, law, physics, state, slips, h)
-    models.move(model, state, _shift(change, h))
-    models.kick(model, physics, state, _impulse(physics, change), 1.0)
+    models.move(model, state, scaled(change, h))
+    change[:3] *= physics.mass
+    change[3:] *= physics.inertia
+    models.kick(model, physics, state, scaled(change, 1.0), 1.0)
     return 1
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight, those of symplectic Euler."""
-    free_flight.flight(model, physics, state, h, steps, LAG)
-
-
-@njit
-def _shift(change: Array, h: float) -> Motion:
-    return h * change[0], h * change[1], h * change[2], h * change[3], h * change[4], h * change[5]
-
-
-@njit
-def _impulse(physics: Physics, change: Array) -> Motion:
-    """Return the impulse [N s], linear and angular [N m s], that changes velocity [m/s] and spin [rad/s] so."""
-    m, i = physics.mass, physics.inertia
-    return m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
-
-
-@njit
-def _node_velocity(state: Any, k: int) -> tuple[float, float, float]:
-    rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-    wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    return ux + (wy * rz - wz * ry), uy + (wz * rx - wx * rz), uz + (wx * ry - wy * rx)
-
-
-@njit
-def _sliding(physics: Physics, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
-    """Return the part of a velocity along the ground [m/s]."""
-    speed = physics.nx * ux + physics.ny * uy + physics.nz * uz
-    return ux - speed * physics.nx, uy - speed * physics.ny, uz - speed * physics.nz
 
 
 @njit
@@ -107,8 +86,7 @@ def _slips(physics: Physics, state: Any) -> Array:
     """Return each node's speed along the ground, cutoff added, shape (node,) [m/s]."""
     slips = np.empty(state.node_offset.shape[0])
     for k in range(slips.shape[0]):
-        ux, uy, uz = _node_velocity(state, k)
-        tx, ty, tz = _sliding(physics, ux, uy, uz)
+        _, tx, ty, tz = split(physics, *node_velocity(state, k))
         slips[k] = math.sqrt(tx * tx + ty * ty + tz * tz) + physics.cutoff
     return slips
 
@@ -151,17 +129,15 @@ def _assemble(
     system[:] = 0.0
     for k in range(system.shape[0]):
         system[k, k] = physics.mass if k < 3 else physics.inertia
-    nx, ny, nz = physics.nx, physics.ny, physics.nz
     pressing = 0
     for k in range(slips.shape[0]):
         rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-        depth = -(nx * (state.position[0] + rx) + ny * (state.position[1] + ry) + nz * (state.position[2] + rz))
-        ux, uy, uz = _node_velocity(state, k)
-        speed = nx * ux + ny * uy + nz * uz
+        depth = -upward(physics, state.position[0] + rx, state.position[1] + ry, state.position[2] + rz)
+        speed, tx, ty, tz = split(physics, *node_velocity(state, k))
         push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
         by_depth, by_speed = normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
         stiffening = h * by_depth - by_speed
-        along = _lever(rx, ry, rz, nx, ny, nz)
+        along = _lever(rx, ry, rz, physics.nx, physics.ny, physics.nz)
         pressed = push - stiffening * _dot(along, change)
         if (nodes >> k) & 1 == 0 or pressed <= 0.0:
             continue
@@ -169,7 +145,6 @@ def _assemble(
         _add(system, along, h * stiffening, h * push)
         if rubbing:
             grip = h * physics.friction * pressed / slips[k]
-            tx, ty, tz = _sliding(physics, ux, uy, uz)
             _add(system, _lever(rx, ry, rz, tx, ty, tz), 0.0, -grip)
             _add(system, _lever(rx, ry, rz, 1.0, 0.0, 0.0), grip, 0.0)
             _add(system, _lever(rx, ry, rz, 0.0, 1.0, 0.0), grip, 0.0)
@@ -205,15 +180,8 @@ def _add(system: Array, along: Motion, resistance: float, impulse: float) -> Non
 
 @njit
 def _solve(system: Array, change: Array) -> None:
-    """Solve a symmetric positive definite system, shape (n, n + 1), by elimination, which needs no pivots there."""
+    """Solve the equations, shape (n, n + 1), of which the last column is the right side."""
     size = system.shape[0]
-    for k in range(size):
-        for i in range(k + 1, size):
-            factor = system[i, k] / system[k, k]
-            for j in range(k + 1, size + 1):
-                system[i, j] -= factor * system[k, j]
-    for k in range(size - 1, -1, -1):
-        known = system[k, size]
-        for j in range(k + 1, size):
-            known -= system[k, j] * change[j]
-        change[k] = known / system[k, k]
+    change[:size] = system[:, size]
+    factorise(system)
+    solve(system, change)
