@@ -1,8 +1,8 @@
 """What the ground does to one node: the normal force by contact law, and friction (paper, section 4.2).
 
-A contact law is a tag and a normal force, in `LAWS` and in `push`. Its name, and how it damps what comes towards the
-ground, are in `scene/flat_landing.py`. The motion relies on two properties: the force is linear in
-depth and speed wherever the law acts, and never negative.
+A contact law is a tag and a normal force, in `LAWS` and in `push`; its name, and how it damps what comes towards the
+ground, are in `scene/flat_landing.py`. The force is linear in depth and speed wherever it is not zero. The closed forms
+(`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
 from __future__ import annotations

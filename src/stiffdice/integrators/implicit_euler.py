@@ -1,23 +1,21 @@
 """Implicit Euler, linear in the contact force: the whole step under the forces at its end, found by linear equations.
 
-Of M(v' − v) = h F(x + h v', v') it takes F linear. That is the formula of Baraff and Witkin (1998, Large steps in cloth
-simulation, SIGGRAPH), (M − h ∂F/∂v − h² ∂F/∂x) Δv = h (F + h ∂F/∂x v), but linear about the place to which free flight
-would take the cube in this step, not about the present one; where the force is linear, that is the same. A node that
-comes to the ground within the step is pressed in it already, and one that leaves is not held back. Linear about the
-present place the cube would first sink by up to h|v|, its springs would hold up to (ωh)² times the energy that it came
-with, and pull, prolonged, on the nodes that they threw up. Here a flat cube's step is that of implicit Euler itself: no
-step gains energy, the springs' included, at any stiffness (its potential is convex; Hairer and Wanner, Solving Ordinary
-Differential Equations II, IV.12). That is paid by the bounce, which keeps about exp(−πωh/2) of its speed where ωh is
-small, and less than (ωh)⁻² where it is large. What is a depth d in the ground comes out at d/h at most; the nodes of
-a turning cube, whose arcs are not linear, may so gain some h ω² r: nothing to speak of below a twentieth of a radian a
-step, and some tenths of the energy at one.
+Of M(v' − v) = h F(x + h v', v') it takes F linear: (M − h ∂F/∂v − h² ∂F/∂x) Δv = h (F + h ∂F/∂x v) (Baraff and Witkin
+1998, Large steps in cloth simulation, SIGGRAPH), but about the place to which free flight would take the cube in this
+step. So a node that comes to the ground within the step is pressed in it already, and one that leaves is not held back.
+About the present place the cube would first sink by up to h|v|, and its springs hold up to (ωh)² times its energy.
 
-Two linear systems make a step, or some more. The first is without friction; again without the nodes that it would hold
-down, until there are none. The last has friction by these normal forces: F_f = −μ F_n u_t/(|u_t| + cutoff) with u_t at
-the end of the step and |u_t| at its begin. This is friction's chord, not its tangent, whose steps would overshoot
-standing still as explicit ones do: it turns no sliding node around, and the matrix stays symmetric and positive
-definite at any coefficient. It errs by μ g h/u, of first order as the rest, which it is with any matrix (Steihaug and
-Wolfbrandt 1979, Math. Comp. 33, 521).
+No step of a flat cube gains energy, the springs' included, at any stiffness (its potential is convex; Hairer and
+Wanner, Solving Ordinary Differential Equations II, IV.12). The bounce pays for it: it keeps about exp(−πωh/2) of its
+speed where ωh is small, and less than (ωh)⁻² where it is large. A depth d comes out of the ground at d/h at most. The
+nodes of a turning cube, whose arcs are not linear, may gain some h ω² r: nothing to speak of below a twentieth of a
+radian a step, and some tenths of the energy at one.
+
+The first system is without friction; it is solved again without the nodes that it would hold down, until there are
+none. The last has friction by these normal forces: F_f = −μ F_n u_t/(|u_t| + cutoff) with u_t at the end of the step
+and |u_t| at its begin. This is friction's chord: its tangent would overshoot standing still as explicit steps do. It
+turns no sliding node around, and the matrix stays symmetric and positive definite at any coefficient. It errs by
+μ g h/u, of first order as the rest (Steihaug and Wolfbrandt 1979, Math. Comp. 33, 521).
 
 One evaluation of the nodes' forces and slopes a step. In free flight it is symplectic Euler.
 """

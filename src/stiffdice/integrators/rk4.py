@@ -1,11 +1,10 @@
 """The classical Runge-Kutta scheme of order four, its rotations by the method of Munthe-Kaas.
 
-Place and momenta are advanced as ever (Kutta 1901; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations
-I, II.1). The orientation is exp(θ) times that at the step's begin, so that the cube stays rigid, and the scheme is that
-of the rotation vector: θ' = ω − θ × ω/2 + θ × (θ × ω)/12, what order four needs of dexp⁻¹ (Munthe-Kaas 1999, Appl.
-Numer. Math. 29, 115; Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). θ' = ω while the spin keeps
-its direction: a free flight is exact. An undamped oscillator is stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in
-a small step (Hairer and Wanner, II, IV.2).
+Place and momenta: Kutta 1901; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, II.1. The
+orientation is exp(θ) times that at the step's begin, so that the cube stays rigid, with
+θ' = ω − θ × ω/2 + θ × (θ × ω)/12, what order four needs of dexp⁻¹ (Munthe-Kaas 1999, Appl. Numer. Math. 29, 115;
+Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). A free flight is exact. An undamped oscillator is
+stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in a small step (Hairer and Wanner, II, IV.2).
 """
 
 from __future__ import annotations

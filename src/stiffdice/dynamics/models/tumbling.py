@@ -80,21 +80,9 @@ def _spin(physics: Physics, state: Any) -> tuple[float, float, float]:
 def rotate(state: Any, ax: float, ay: float, az: float, angle: float) -> None:
     """Turn the nodes about a unit axis: R = P + cos(angle)·(E − P) + sin(angle)·A, after equation 9."""
     c, s = math.cos(angle), math.sin(angle)
-    rxx, rxy, rxz = (
-        ax * ax + c * (1 - ax * ax),
-        ax * ay - c * (ax * ay) - s * az,
-        ax * az - c * (ax * az) + s * ay,
-    )
-    ryx, ryy, ryz = (
-        ay * ax - c * (ay * ax) + s * az,
-        ay * ay + c * (1 - ay * ay),
-        ay * az - c * (ay * az) - s * ax,
-    )
-    rzx, rzy, rzz = (
-        az * ax - c * (az * ax) - s * ay,
-        az * ay - c * (az * ay) + s * ax,
-        az * az + c * (1 - az * az),
-    )
+    rxx, rxy, rxz = ax * ax + c * (1 - ax * ax), ax * ay - c * (ax * ay) - s * az, ax * az - c * (ax * az) + s * ay
+    ryx, ryy, ryz = ay * ax - c * (ay * ax) + s * az, ay * ay + c * (1 - ay * ay), ay * az - c * (ay * az) - s * ax
+    rzx, rzy, rzz = az * ax - c * (az * ax) - s * ay, az * ay - c * (az * ay) + s * ax, az * az + c * (1 - az * az)
     nodes = state.node_offset
     for k in range(nodes.shape[0]):
         x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
