@@ -8,7 +8,7 @@ A model leaves something out, and is exact where that would do nothing:
   those four alone;
 - friction and the place on the ground (`vertical`), where nothing moves the cube along level ground.
 
-Exact is meant of the motion, not of round-off, which the full model may amplify: of a cube that is flat on a slope, say,
+Exact is meant of the motion, not of round-off, which the full model may amplify: of a cube that is flat on a slope,
 each bounce makes a torque of round-off larger (measured: 7 times at S = 1e2, 2400 times at 1e6 kg/s², 1 kg), and steps
 too long for friction's cutoff make chatter of it (`friction_chatter.py`).
 
