@@ -73,9 +73,9 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.drift(model, physics, state, h)
     change = _solved(model, law, physics, state, slips, h)
     models.move(model, state, scaled(change, h))
-    change[:3] *= physics.mass
-    change[3:] *= physics.inertia
-    models.kick(model, physics, state, scaled(change, 1.0), 1.0)
+    m, i = physics.mass, physics.inertia
+    impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
+    models.kick(model, physics, state, impulse, 1.0)
     return 1
 
 
@@ -180,6 +180,7 @@ def _add(system: Array, along: Motion, resistance: float, impulse: float) -> Non
 def _solve(system: Array, change: Array) -> None:
     """Solve the equations, shape (n, n + 1), of which the last column is the right side."""
     size = system.shape[0]
-    change[:size] = system[:, size]
+    for k in range(size):
+        change[k] = system[k, size]
     factorise(system)
     solve(system, change)
