@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench, normal_force, reaches
-from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Physics
 
 
@@ -19,14 +18,6 @@ class Vertical(NamedTuple):
 
 
 TAG = Vertical()
-
-# Its launch has no velocity along the ground, and nothing gives it one.
-motion = sliding.motion
-move = sliding.move
-turn = sliding.turn
-turns = sliding.turns
-touches = sliding.touches
-extent = sliding.extent
 
 
 @njit
@@ -38,8 +29,7 @@ def force(law: Any, physics: Physics, state: Any) -> Wrench:
     nodes = state.node_offset
     fz = 0.0
     for k in range(nodes.shape[0]):
-        push = normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping)
-        fz += push - physics.node_weight
+        fz += normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping) - physics.node_weight
     return 0.0, 0.0, fz, 0.0, 0.0, 0.0
 
 
