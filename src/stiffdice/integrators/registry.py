@@ -1,9 +1,8 @@
 """Time-stepping schemes. A scheme is a module with TAG, LAG, FORMULA and `step`; one line registers it.
 
 One that takes steps of its own has a `part` in place of `step` (`adaptive_steps.py`). One that has a `swing`, for which
-the bounds of `fast_forward.py` are proven, takes many steps of a contact at once.
-One that does not apply to every scene and model also has
-`unfit(scene, model)`, which says why not.
+the bounds of `fast_forward.py` are proven, takes many steps of a contact at once. One that does not apply to every
+scene and model also has `unfit(scene, model)`, which says why not.
 """
 
 from __future__ import annotations
