@@ -313,7 +313,7 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         ("question", None, "question is missing"),
         ("dpi", 5, "dpi = 5: allowed is a whole number from 50 to 1200"),
         ("runs.figure-04.steps", 0, "runs.figure-04.steps = 0: allowed is a whole number from 1 to"),
-        ("runs.figure-04.every", 30_000, "runs.figure-04.every = 30000"),
+        ("runs.figure-04.every", 30_000, "runs.figure-04: every = 30000"),
         ("runs.figure-04.presets", ["corrected"], "state cube.inertia"),
         ("runs.Figure 4", {"scene": "x", "model": "sliding", "steps": 1}, "Figure 4"),
         ("figures.energy.run", "figure-99", "figures.energy.run = figure-99: allowed is figure-04 or figure-09"),

@@ -19,8 +19,9 @@ from stiffdice.simulation.engines.registry import ENGINES
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import simulate
-from stiffdice.sweep import cost_model, sweep
+from stiffdice.sweep import cost_model
 from stiffdice.sweep.grid import Column, Piece, Sweep
+from stiffdice.sweep.shard import BLOCK
 
 SPIN = {"angular_momentum": [0.3, 0.5, 0.2], "node_velocity": "rigid"}
 ALL = {"finite": 0, "energy": 0.05, "apex": 0.02, "restitution": 0.05, "trajectory": 0.05}
@@ -251,4 +252,4 @@ def test_a_fall_in_drag_is_known(drag):
 
 
 def test_a_block_is_that_of_a_sweep():
-    assert cost_model.MEMBERS == sweep.BLOCK
+    assert cost_model.MEMBERS == BLOCK

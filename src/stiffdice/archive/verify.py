@@ -26,7 +26,7 @@ from stiffdice.io.reader import open_file, parts
 from stiffdice.io.text_file import rows_of, text_of
 from stiffdice.study import config as studies
 from stiffdice.study import job_log, output_digest, provenance
-from stiffdice.sweep import sweep
+from stiffdice.sweep.collect import collect
 
 CRATE = "ro-crate-metadata.json"
 
@@ -318,7 +318,7 @@ class _Files:
         try:
             names = meanings_of(collected["criterion"])
             tolerances = dict(zip(names, map(float, collected["tolerance"].values), strict=True))
-            again = sweep.collect(each(), tolerances)
+            again = collect(each(), tolerances)
         except Exception as error:  # whatever hostile shards make of it
             for _ in each():  # those that it did not come to
                 pass

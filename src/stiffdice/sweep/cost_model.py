@@ -204,20 +204,21 @@ def _run(sweep: Sweep, ball: _Ball, column: Index, steps: Array, compared: float
         known = _known(sweep, ball, rests, column, h)
     ends = _ends(sweep, ball, course, column, h, compared, known) if sweep.early_stop else np.full(h.shape, duration)
     if not ours:
-        return np.asarray(price.start + seen * ends / h)
+        return np.asarray(price.start + seen * np.fmin(steps, ends / h))
     aside = default and sweep.members >= FEWEST and compared == 0.0
     before, whole = (_stepped(sweep, ball, part, aside, column, h) for part in (_course(ball, compared), course))
     first = np.where(compared / LOOKS >= FEWEST_BETWEEN * h, before + LOOKS, compared / h)
     late = UNSEEN.step(sweep.model) if default else seen
     unseen = np.where((ball.drag > 0.0)[column] & aside, ASIDE.step(sweep.model), late)
-    seconds = price.start + seen * first * _share(ends, 0.0, compared)
-    seconds = seconds + unseen * np.fmax(0.0, whole - before) * _share(ends, compared, rests)
-    return np.asarray(seconds + unseen * np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h)
+    first = np.fmin(compared / h, first * _share(ends, 0.0, compared))
+    later = np.fmax(0.0, whole - before) * _share(ends, compared, rests)
+    later = later + np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h
+    return np.asarray(price.start + seen * first + unseen * np.fmin(steps, later))
 
 
 def _share(ends: Array, start: float, end: Array | float) -> Array:
     """Return the part of the time from start to end that is over when runs end."""
-    return np.asarray(np.fmin(1.0, np.fmax(0.0, ends - start) / (end - start)))
+    return np.asarray(np.fmin(1.0, np.fmax(0.0, ends - start) / np.fmax(0.0, end - start)))
 
 
 def _stepped(sweep: Sweep, ball: _Ball, course: _Course, aside: bool, column: Index, h: Array) -> Array:
