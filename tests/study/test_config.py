@@ -356,7 +356,7 @@ def test_a_sweep_of_the_ground_that_a_restitution_is_for_has_it(changed):
 
 
 def test_a_study_that_is_not_there_is_told_with_those_that_are(tmp_path, study_schema):
-    told = r"config/stabilty.yaml: there is no study stabilty; .* quick, stability.*; did you mean stability\?$"
+    told = r"config/stabilty.yaml: there is no study stabilty; .* quick, .*stability.*; did you mean stability\?$"
     with pytest.raises(InputError, match=told):
         study.load(CONFIG / "stabilty.yaml", study_schema)
     with pytest.raises(InputError, match=f"there is no study x; {tmp_path}/ has none$"):
