@@ -118,16 +118,17 @@ def _cut_at_multiples(pieces: Sequence[Piece], costs: Array, work: float) -> lis
 
     What is left at the end of a law, if it is less than half of that, is done with the part before.
     """
-    found, start = [], 0
+    found, start = list[tuple[tuple[Piece, ...], float]](), 0
     for _, of_law in groupby(pieces, lambda piece: piece.column.contact):
         here = list(of_law)
         end = start + sum(len(piece.steps) for piece in here)
         seconds, start = costs[start:end], end
         reached = np.cumsum(seconds)
-        parts = max(1, int(reached[-1] / work + 0.5))
-        numbers = np.minimum(((reached - seconds / 2) / work).astype(np.int64), parts - 1)
-        sums = np.bincount(numbers, seconds, parts).tolist()
-        found += [(part, total) for part, total in zip(_dealt(here, numbers, parts), sums, strict=True) if part]
+        last = max(0.0, np.floor(reached[-1] / work + 0.5) - 1)
+        multiples = np.fmin(np.floor((reached - seconds / 2) / work), last)
+        _, numbers = np.unique(multiples, return_inverse=True)  # as many parts as cells, however dear these are
+        parts = int(numbers[-1]) + 1
+        found += zip(_dealt(here, numbers, parts), np.bincount(numbers, seconds).tolist(), strict=True)
     return found
 
 
