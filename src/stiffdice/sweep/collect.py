@@ -12,7 +12,7 @@ import xarray as xr
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.errors import InputError
 from stiffdice.io import schema
-from stiffdice.io.content_digest import cell_digests, digest_of_cells
+from stiffdice.io.content_digest import cell_digests, runs_digest
 from stiffdice.simulation import dataset
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria import registry as criteria
@@ -50,7 +50,7 @@ def collect(
     return _sorted(pattern, columns).assign_attrs(
         asked,
         title="Sweep of stiffness and steps",
-        runs_digest=digest_of_cells(digests),
+        runs_digest=runs_digest(digests),
         judging_code_digest=code_digest("stiffdice.sweep.collect"),
     )
 
