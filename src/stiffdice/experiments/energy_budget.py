@@ -42,7 +42,7 @@ def measure(
     counts = [validation.count("steps", part) for part in steps]
     kept = [
         [
-            energy_budget.keep(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=count)
+            energy_budget.ledger(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=count)
             for count in counts
         ]
         for law in LAWS
@@ -51,15 +51,15 @@ def measure(
     described: dict[str, tuple[Any, Any, str]] = {
         name: (grid, _of_bounces(kept, name, bounces), text) for name, text in _PARTS.items()
     }
-    described["energy_before"] = (grid, _energies(kept, bounces), "energy before the bounce")
+    described["energy_before"] = (grid, _of_bounces(kept, "energy_before", bounces), "energy before the bounce")
     described["flight_drag_work"] = (
         grid[:2],
-        [[float(book.flights.drag_work) for book in row] for row in kept],
+        [[float(book["flight_drag_work"]) for book in row] for row in kept],
         "work of the ungated law in flight",
     )
     described["run_scheme_work"] = (
         grid[:2],
-        [[float(book.run.scheme_work) for book in row] for row in kept],
+        [[float(book["scheme_work"]) for book in row] for row in kept],
         "what the scheme made in the whole run, or lost if negative",
     )
     described["miss"] = (
@@ -84,17 +84,14 @@ def measure(
     return xr.Dataset(variables, coordinates, attributes)
 
 
-def _miss(book: energy_budget.Ledger) -> float:
+def _miss(book: xr.Dataset) -> float:
     """Return how far the works are from the change of energy of a run [J]."""
-    return float(book.run.energy_change - (book.end_energy - book.launch_energy))
+    change = book["damping_work"] + book["drag_work"] + book["friction_work"] + book["scheme_work"]
+    return float(change - (book["end_energy"] - book["launch_energy"]))
 
 
-def _of_bounces(kept: Sequence[Sequence[energy_budget.Ledger]], name: str, bounces: int) -> Array:
-    return np.array([[_padded(getattr(book.bounces.works, name), bounces) for book in row] for row in kept])
-
-
-def _energies(kept: Sequence[Sequence[energy_budget.Ledger]], bounces: int) -> Array:
-    return np.array([[_padded(book.bounces.energy_before, bounces) for book in row] for row in kept])
+def _of_bounces(kept: Sequence[Sequence[xr.Dataset]], name: str, bounces: int) -> Array:
+    return np.array([[_padded(book[f"bounce_{name}"].values, bounces) for book in row] for row in kept])
 
 
 def _padded(values: Array, count: int) -> Array:
