@@ -121,7 +121,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
     return Path(states, round(stages * effort.steps), computed)
 
 
-def lead(scene: Scene, method: str, effort: Effort) -> float:
+def lag_time(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
     if not fixed_step(method):
         return 0.0

@@ -25,7 +25,7 @@ from stiffdice.experiments.work_precision.effort import (
     chosen_from,
     fixed_step,
     ladder,
-    lead,
+    lag_time,
     methods_for,
     path_of,
 )
@@ -154,7 +154,7 @@ def _climbed(
             if rungs or too_dear == _TRIES:
                 break
             continue
-        rungs.append(Rung(effort, path, judge.errors(path.states, lead(scene, method, effort))))
+        rungs.append(Rung(effort, path, judge.errors(path.states, lag_time(scene, method, effort))))
     return rungs
 
 
