@@ -132,6 +132,8 @@ def _advise(options: argparse.Namespace) -> int:
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
     from stiffdice.advice import report as advice_text
+    from stiffdice.advice.check import check as checked
+    from stiffdice.advice.check import run_advised
     from stiffdice.cli.progress import Notes, Progress
     from stiffdice.simulation.outcome import Verdict
 
@@ -141,9 +143,9 @@ def _advise(options: argparse.Namespace) -> int:
     check = None
     if options.run and given.best is not None:
         with Progress() as progress:
-            run = recommend.run_advised(given, given.best, progress.show)
+            run = run_advised(given, given.best, progress.show)
         with Progress() as progress:
-            check = recommend.check(given, run, progress.show)
+            check = checked(given, run, progress.show)
         if target is not None:
             from stiffdice.io.writer import write_dataset
             from stiffdice.simulation.dataset import run_dataset

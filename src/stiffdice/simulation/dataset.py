@@ -54,20 +54,6 @@ CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
     "steps": {"long_name": "number of time steps", "units": "1"},
     "omega_h": {"long_name": "contact frequency of a flat landing times step size", "units": "1"},
 }
-# Of what every method spent on one ground after another.
-EFFORT_DIMENSIONS = ("stiffness", "method", "effort")
-EFFORT_ATTRIBUTES: dict[str, dict[str, Any]] = {
-    "steps": {"long_name": "number of time steps, 0 where the method takes its own", "units": "1"},
-    "tolerance": {"long_name": "tolerance of a method that controls its own error", "units": "1"},
-}
-
-
-def method_coordinates(stiffness: Sequence[float], methods: Sequence[str]) -> dict[str, Any]:
-    """Return the coordinates of what every method did on grounds of these stiffnesses [kg/s²]."""
-    return {
-        "stiffness": ("stiffness", list(stiffness), CELL_ATTRIBUTES["stiffness"]),
-        "method": ("method", np.arange(len(methods), dtype=np.int8), enum_attributes("method", list(methods))),
-    }
 
 
 def criterion_attributes(names: Sequence[str]) -> dict[str, Any]:
