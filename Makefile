@@ -10,7 +10,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff elastic peers study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement engines study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,11 +33,11 @@ extremes: install  ## where and how runs fail at the extremes, into results/extr
 tradeoff: install  ## what accuracy costs by scheme, into results/tradeoff/
 	@$(RUN) tradeoff
 
-elastic: install  ## a dense grid's answer for fewer runs, into results/elastic/
-	@$(RUN) elastic
+refinement: install  ## a dense grid's answer for fewer runs, into results/refinement/
+	@$(RUN) refinement
 
-peers: install  ## the engines that are installed beside stiffdice, into results/peers/
-	@$(RUN) peers
+engines: install  ## the engines that are installed beside stiffdice, into results/engines/
+	@$(RUN) engines
 
 study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(RUN) study --config 'study=$(STUDY)'
@@ -79,8 +79,8 @@ types: install  ## check types (mypy)
 
 check: lint types test  ## all of the above
 
-docs: install  ## write docs/api.md from the docstrings of the public names
-	@$(BIN)/python docs/make_api.py
+docs: install  ## write docs/api.md from the docstrings of the public names, the tables of docs/FORMAT.md from the schema
+	@$(BIN)/python docs/make_api.py && $(BIN)/python docs/make_format.py
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
 	@for name in build requirements engines; do \

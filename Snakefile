@@ -4,8 +4,8 @@
 #   snakemake stability                   what "stable" means, measured
 #   snakemake extremes                    where and how runs fail at the extremes
 #   snakemake tradeoff                    what accuracy costs, by scheme
-#   snakemake elastic                     whether fewer runs, put where members disagree, say as much
-#   snakemake peers                       other engines beside stiffdice, as far as they are installed
+#   snakemake refinement                  whether fewer runs, put where members disagree, say as much
+#   snakemake engines                     other engines beside stiffdice, as far as they are installed
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -58,14 +58,14 @@ rule tradeoff:
         lambda wildcards: everything_of("tradeoff"),
 
 
-rule elastic:
+rule refinement:
     input:
-        lambda wildcards: everything_of("elastic"),
+        lambda wildcards: everything_of("refinement"),
 
 
-rule peers:
+rule engines:
     input:
-        lambda wildcards: everything_of("peers"),
+        lambda wildcards: everything_of("engines"),
 
 
 rule study:

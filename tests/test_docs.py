@@ -34,9 +34,9 @@ PAGES = [
     "docs/speed.md",
     "docs/stability.md",
     "docs/tradeoff.md",
-    "docs/peers.md",
-    "docs/peers-drake.md",
-    "docs/peers-mujoco-pybullet.md",
+    "docs/engines.md",
+    "docs/engines-drake.md",
+    "docs/engines-mujoco-pybullet.md",
     "docs/FORMAT.md",
     "docs/archive.md",
     "docs/verify.md",
@@ -47,7 +47,7 @@ PAGES = [
     "docs/slurm.md",
     "docs/scale.md",
     "docs/cost.md",
-    "docs/elastic.md",
+    "docs/refinement.md",
     "CHANGELOG.md",
 ]
 
@@ -154,7 +154,7 @@ def test_every_scheme_is_explained(capsys):
 
 
 def test_every_engine_is_explained(capsys):
-    for page, heading in (("docs/peers.md", "Engines"), ("config/README.md", "Study")):
+    for page, heading in (("docs/engines.md", "Engines"), ("config/README.md", "Study")):
         told = " ".join(row[0] for row in table_keys(page, heading))
         assert all(f"`{name}`" in told for name in ENGINES), page
     with pytest.raises(SystemExit):

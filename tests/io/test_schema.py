@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
+import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from stiffdice.io import schema
-from stiffdice.io.attribute_check import FORMAT_VERSION
 from stiffdice.io.reader import open_file
+from stiffdice.io.schema import FORMAT_VERSION
 
-PAGE = (Path(__file__).parents[2] / "docs" / "FORMAT.md").read_text(encoding="utf-8")
+PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
 
 
 @pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier", "experiment"])
@@ -24,19 +26,34 @@ def test_what_is_written_is_as_the_format_says(written, kind):
     assert {name for name, part in known.items() if part.need == schema.RECOMMENDED} <= set(dataset.attrs)
 
 
+def test_the_page_is_up_to_date():
+    """`make docs` writes its tables."""
+    make_format = runpy.run_path(str(PAGE.with_name("make_format.py")))
+    assert make_format["page"](PAGE.read_text(encoding="utf-8")) == PAGE.read_text(encoding="utf-8")
+
+
 def test_the_page_has_a_line_for_everything():
-    for name, attribute in schema.ATTRIBUTES.items():
-        assert f"| `{name}` | {attribute.type} | {attribute.need} | " in PAGE
-    for kind, told in schema.KINDS.items():
-        section = PAGE.split(f"## {kind}\n")[1].split("\n## ")[0]
-        rows = [line for line in section.splitlines() if line.startswith("| `")]
-        asked = [f"| `{name}` | {part.type} | {part.need} | " for name, part in told.attributes.items()]
-        for name, part in told.variables.items():
-            dimensions = ", ".join(part.dimensions) or "none"
-            asked.append(f"| `{name}` | {dimensions} | {part.type} | {part.units} | {part.need} | ")
-        assert len(rows) == len(asked)
-        for row, start in zip(rows, asked, strict=True):
-            assert row.startswith(start)
+    sections = dict(part.split("\n", 1) for part in PAGE.read_text(encoding="utf-8").split("\n## ")[1:])
+    for title, kind in {"In all files": schema.Kind(schema.ATTRIBUTES, {}), **schema.KINDS}.items():
+        rows = re.findall(r"^\| `(\w+)` \|", sections[title], re.MULTILINE)
+        assert rows == [*kind.attributes, *kind.variables]
+
+
+@pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier"])
+def test_names_in_files_are_those_of_the_schema(written, kind):
+    """Of an enum only the words are the writer's, of a measure the name is its criterion's."""
+    dataset = open_file(written[kind])
+    for name, part in schema.KINDS[kind].variables.items():
+        if name in dataset.variables and not part.long_name.startswith("measure of criterion"):
+            assert dataset[name].attrs["long_name"] == part.long_name
+            assert (name in dataset.coords) == (schema.COORDINATE in part.role)
+            assert ("flag_meanings" in dataset[name].attrs) == (schema.ENUM in part.role)
+
+
+def test_what_came_later_is_not_demanded_of_older_files(run):
+    without = run.drop_vars("ending")
+    assert schema.problems(without) == ["variable ending is missing"]
+    assert schema.problems(without.assign_attrs(format_version="1.2")) == []
 
 
 @pytest.fixture

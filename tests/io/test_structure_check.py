@@ -15,9 +15,9 @@ import xarray as xr
 
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation, seal, structure_check
-from stiffdice.io.attribute_check import FORMAT_VERSION
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.io.reader import open_file, parts
+from stiffdice.io.schema import FORMAT_VERSION
 from stiffdice.io.writer import write_dataset
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.dataset import provenance_attributes

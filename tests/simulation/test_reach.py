@@ -16,33 +16,33 @@ def grown(sweep, column, passes):
 
 
 @pytest.fixture(scope="module")
-def elastic(plan):
+def adaptive(plan):
     return dataclasses.replace(plan, omega_h={"from": 3.0, "to": 0.03, "count": 320}, refine=4, reach=1.2)
 
 
-def test_an_elastic_sweep_has_cells_of_its_grid_only_and_all_of_them_about_an_edge(elastic):
-    column = elastic.columns()[0]
-    whole = dataclasses.replace(elastic, refine=0, reach=None).scan(column)
+def test_an_adaptive_sweep_has_cells_of_its_grid_only_and_all_of_them_about_an_edge(adaptive):
+    column = adaptive.columns()[0]
+    whole = dataclasses.replace(adaptive, refine=0, reach=None).scan(column)
     edge = whole[150]
-    cells = grown(elastic, column, lambda steps: float(steps > edge))
+    cells = grown(adaptive, column, lambda steps: float(steps > edge))
     assert set(cells) < set(whole)
     assert len(cells) < 0.35 * len(whole)
     assert {steps for steps in whole if edge / 1.2 <= steps <= edge * 1.2} <= set(cells)
-    assert np.diff(np.searchsorted(whole, cells)).max() == 2**elastic.refine
+    assert np.diff(np.searchsorted(whole, cells)).max() == 2**adaptive.refine
 
 
-def test_a_hole_within_reach_of_an_edge_is_found(elastic):
+def test_a_hole_within_reach_of_an_edge_is_found(adaptive):
     """A single cell fails beyond an edge; refining between disagreeing neighbours alone passes over it."""
-    column = elastic.columns()[0]
-    whole = elastic.whole_scan(column)
+    column = adaptive.columns()[0]
+    whole = adaptive.whole_scan(column)
     hole = whole[155]
     fails = {*whole[:147], hole}
-    assert hole in grown(elastic, column, lambda steps: float(steps not in fails))
-    narrow = dataclasses.replace(elastic, reach=1.0)
+    assert hole in grown(adaptive, column, lambda steps: float(steps not in fails))
+    narrow = dataclasses.replace(adaptive, reach=1.0)
     assert hole not in grown(narrow, column, lambda steps: float(steps not in fails))
 
 
-def test_without_disagreement_an_elastic_sweep_stays_coarse(elastic):
-    column = elastic.columns()[0]
-    assert grown(elastic, column, lambda steps: 1.0) == elastic.scan(column)
-    assert len(elastic.scan(column)) <= 320 / 16 + 1
+def test_without_disagreement_an_adaptive_sweep_stays_coarse(adaptive):
+    column = adaptive.columns()[0]
+    assert grown(adaptive, column, lambda steps: 1.0) == adaptive.scan(column)
+    assert len(adaptive.scan(column)) <= 320 / 16 + 1

@@ -38,7 +38,7 @@ def test_every_job_takes_its_start_and_a_shard_its_predicted_work_besides(load):
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(
     ("name", "core_seconds"),  # of the processor, as `time` told them of whole runs
-    [("paper", 55), ("elastic", 219), ("stability", 431), ("extremes", 103), ("tradeoff", 228)],
+    [("paper", 55), ("refinement", 219), ("stability", 431), ("extremes", 103), ("tradeoff", 228)],
 )
 def test_what_was_measured_is_foretold_within_a_factor_of_one_and_a_half(load, name, core_seconds):
     assert 1 / 1.5 < sum(forecast.seconds(load(name)).values()) / core_seconds < 1.5

@@ -35,8 +35,8 @@ def made(project, *names):
         ("stability", "map-sliding.svg (Where a sliding cube passes)"),
         ("extremes", "atlas.svg (Where and how runs fail"),
         ("tradeoff", "evaluations-position.svg (Error of the position against force evaluations)"),
-        ("elastic", "elastic.svg (A cube that slides: the dense grid's answer"),
-        ("peers", "limits.svg (One flat bounce with longer and longer steps"),
+        ("refinement", "refinement.svg (A cube that slides: the dense grid's answer"),
+        ("engines", "limits.svg (One flat bounce with longer and longer steps"),
     ],
 )
 def test_the_first_figure_that_shows_more_than_single_runs(ending, project, study, figure):

@@ -1,34 +1,50 @@
-"""The format of our files, as a table: which attributes and variables each kind of file has (docs/FORMAT.md)."""
+"""The format of our files as tables. From them follow the layout of written files, the check of read ones
+(`problems`), and the tables of docs/FORMAT.md (`make docs`).
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from stiffdice.io.cf_enums import enum_attributes
+
+# The part before the dot changes when an older reader could not understand a file.
+FORMAT_VERSION = "1.3"
+
 # How much a reader may count on something.
 REQUIRED, RECOMMENDED, OPTIONAL = "required", "recommended", "optional"
 
 TEXT, WHOLE, NUMBER = "text", "whole number", "number"
+COORDINATE, ENUM, LABELS = "coordinate", "enum", "coordinate, enum"
 
 
 class Attribute(NamedTuple):
-    """A global attribute: TEXT, WHOLE or NUMBER."""
+    """A global attribute. type: TEXT, WHOLE or NUMBER. what: it says, for docs/FORMAT.md."""
 
     type: str
+    what: str
     need: str = REQUIRED
 
 
 class Variable(NamedTuple):
-    """A variable: its dimensions, its type as NumPy writes it without byte order, its unit."""
+    """A variable. type: as NumPy writes it without byte order. role: COORDINATE, ENUM, LABELS (both) or none.
+
+    note: what docs/FORMAT.md adds to the long_name. since: version of the format from which on it is there.
+    """
 
     dimensions: tuple[str, ...]
     type: str
-    units: str = "1"
+    units: str
+    long_name: str
+    role: str = ""
+    note: str = ""
     need: str = REQUIRED
+    since: str = "1.2"
 
 
 class Kind(NamedTuple):
@@ -38,45 +54,66 @@ class Kind(NamedTuple):
     variables: Mapping[str, Variable]
 
 
-# Of every file.
 ATTRIBUTES = {
-    "Conventions": Attribute(TEXT),
-    "title": Attribute(TEXT),
-    "format_version": Attribute(TEXT),
-    "kind": Attribute(TEXT),
-    "stiffdice_version": Attribute(TEXT),
-    "libraries": Attribute(TEXT),
-    "code_digest": Attribute(TEXT),
-    "scene": Attribute(TEXT),
-    "scene_digest": Attribute(TEXT),
-    "config": Attribute(TEXT),
-    "config_digest": Attribute(TEXT),
-    "model": Attribute(TEXT),
-    "scheme": Attribute(TEXT),
-    "formula": Attribute(TEXT),
-    "history": Attribute(TEXT, RECOMMENDED),
-    "source": Attribute(TEXT, RECOMMENDED),
-    "references": Attribute(TEXT, RECOMMENDED),
+    "Conventions": Attribute(TEXT, "`CF-1.11`"),
+    "title": Attribute(TEXT, "of what, in words"),
+    "format_version": Attribute(TEXT, f"of this page: `{FORMAT_VERSION}`"),
+    "kind": Attribute(TEXT, "`run`, `shard`, `sweep`, `frontier`, `experiment`, `timing` or `bench`"),
+    "stiffdice_version": Attribute(TEXT, "of the package that wrote it"),
+    "libraries": Attribute(
+        TEXT, "versions of NumPy, numba, LLVM, h5py, h5netcdf, xarray: `name version; name version`"
+    ),
+    "code_digest": Attribute(
+        TEXT, "SHA-256 of the source that the numbers depend on (each module named and all it imports)"
+    ),
+    "scene": Attribute(TEXT, "the physical problem, as JSON: every key, defaults resolved"),
+    "scene_digest": Attribute(TEXT, "SHA-256 of the scene's canonical JSON (keys sorted, no blanks)"),
+    "config": Attribute(
+        TEXT,
+        "the request, as JSON: model, scheme, steps, members, seed, grid, ... and for experiments the options given",
+    ),
+    "config_digest": Attribute(TEXT, "SHA-256 of that text"),
+    "model": Attribute(TEXT, "`vertical`, `sliding`, `tumbling`, `flying`; in experiments also `case` or `all`"),
+    "scheme": Attribute(TEXT, "the time-stepping scheme; of an outside engine, its own"),
+    "formula": Attribute(TEXT, "contact law and one step of the scheme, as formulas"),
+    "history": Attribute(TEXT, "by which version it was made; no time", RECOMMENDED),
+    "source": Attribute(TEXT, "how: CF's word for it", RECOMMENDED),
+    "references": Attribute(TEXT, "what it is about", RECOMMENDED),
 }
 
 _SIMULATOR = {
-    "simulator": Attribute(TEXT),
-    "simulator_version": Attribute(TEXT),
-    "model_reason": Attribute(TEXT, RECOMMENDED),
+    "simulator": Attribute(TEXT, "`stiffdice`, or the engine"),
+    "simulator_version": Attribute(TEXT, "its name and version"),
+    "model_reason": Attribute(TEXT, "why this model, where `auto` was requested", RECOMMENDED),
 }
+_CRITERIA = "criteria of the run, `name: measure <= limit; ...`"
+_HOP_HEIGHT = Attribute(
+    NUMBER,
+    "height that a rebound must reach to be judged by `apex`, in the unit of `hop_height_units` (m)",
+    RECOMMENDED,
+)
 _OF_RUNS = {
     **_SIMULATOR,
-    "seed": Attribute(WHOLE),
-    "early_stop": Attribute(WHOLE),
-    "scene_note": Attribute(TEXT, RECOMMENDED),
-    "criteria": Attribute(TEXT, OPTIONAL),
-    "horizon": Attribute(NUMBER, OPTIONAL),
-    "hop_height": Attribute(NUMBER, RECOMMENDED),
+    "seed": Attribute(WHOLE, "of the jitter of the scan"),
+    "early_stop": Attribute(WHOLE, "1 if a run ends once all criteria are decided, else 0"),
+    "scene_note": Attribute(TEXT, "says that contact law and stiffness are the cell's", RECOMMENDED),
+    "criteria": Attribute(TEXT, f"{_CRITERIA}; only where runs stop early", OPTIONAL),
+    "horizon": Attribute(NUMBER, "until when `trajectory` compares, in the unit of `horizon_units` (s)", OPTIONAL),
+    "hop_height": _HOP_HEIGHT,
 }
 _JUDGED = {
-    "members": Attribute(WHOLE),
-    "runs_digest": Attribute(TEXT),
-    "judging_code_digest": Attribute(TEXT),
+    "members": Attribute(WHOLE, "number of members of a cell"),
+    "runs_digest": Attribute(
+        TEXT, "SHA-256 of all runs of the sweep, however they are dealt to shards (`io/content_digest.py`)"
+    ),
+    "judging_code_digest": Attribute(TEXT, "SHA-256 of the source that judged"),
+}
+_MACHINE = {
+    "machine_processor": Attribute(
+        TEXT,
+        "what the times were taken on; with `machine_cores`, `machine_system`, `machine_load_1_minute`, `versions`",
+    ),
+    "measured_at": Attribute(TEXT, "when, UTC"),
 }
 
 _TIME, _PLACE, _RUN, _CELL = ("time",), ("time", "axis"), ("cell", "member"), ("cell",)
@@ -84,123 +121,211 @@ _EDGES, _FIT = ("contact", "criterion", "stiffness"), ("contact", "criterion", "
 _SCAN = ("criterion", "cell")
 
 _CELLS = {
-    "contact": Variable(_CELL, "i1"),
-    "stiffness": Variable(_CELL, "f8", "kg s-2"),
-    "steps": Variable(_CELL, "i8"),
-    "omega_h": Variable(_CELL, "f8"),
-    "criterion": Variable(("criterion",), "i1"),
+    "contact": Variable(_CELL, "i1", "1", "contact law", LABELS),
+    "stiffness": Variable(_CELL, "f8", "kg s-2", "ground stiffness", COORDINATE, "per node"),
+    "steps": Variable(_CELL, "i8", "1", "number of time steps", COORDINATE),
+    "omega_h": Variable(_CELL, "f8", "1", "contact frequency of a flat landing times step size", COORDINATE),
+}
+_CRITERION = Variable(("criterion",), "i1", "1", "criterion", LABELS)
+_TOLERANCE = Variable(("criterion",), "f8", "1", "tolerance of the criterion")
+
+# Of a run, in its own file without dimensions. The long_name of a measure is its criterion's.
+_OUTCOME = {
+    "touchdown_phase": Variable(
+        _RUN, "f8", "1", "phase of the first touch-down within its time step", note="NaN if there is none"
+    ),
+    "verdict": Variable(_RUN, "i1", "1", "verdict", ENUM, "the gravest of the criteria broken and of `ending`"),
+    "ending": Variable(
+        _RUN,
+        "i1",
+        "1",
+        "how the run ended whatever it was asked, passed if well",
+        ENUM,
+        "a run that did not end well passes no criterion",
+        since="1.3",
+    ),
+    "steps_done": Variable(_RUN, "i8", "1", "steps done when the run ended"),
+}
+_OUT_OF_RANGE = Variable(_RUN, "f8", "1", "1 if a number left the range of doubles")
+
+_RUN_VARIABLES = {
+    "step": Variable(_TIME, "i8", "1", "number of time steps done"),
+    "position": Variable(_PLACE, "f8", "m", "centre of mass"),
+    "velocity": Variable(_PLACE, "f8", "m s-1", "velocity of it"),
+    "kinetic_energy": Variable(_TIME, "f8", "J", "kinetic energy, of translation and rotation"),
+    "potential_energy": Variable(_TIME, "f8", "J", "potential energy m g z of the centre of mass"),
+    "elastic_energy": Variable(_TIME, "f8", "J", "energy in the ground's springs, S d²/2 per node"),
+    "energy_paper": Variable(_TIME, "f8", "J", "kinetic and potential energy, the paper's total"),
+    "mechanical_energy": Variable(
+        _TIME,
+        "f8",
+        "J",
+        "kinetic, potential and elastic energy, the velocity taken at the time of the place",
+        need=RECOMMENDED,
+    ),
+    "angular_momentum": Variable(
+        _PLACE, "f8", "kg m2 s-1", "angular momentum about the centre", note="where the cube turns", need=OPTIONAL
+    ),
+    "node_offset": Variable(
+        ("time", "node", "axis"),
+        "f8",
+        "m",
+        "node relative to the centre",
+        note="where the cube turns",
+        need=OPTIONAL,
+    ),
+    **{name: part._replace(dimensions=()) for name, part in {"out_of_range": _OUT_OF_RANGE, **_OUTCOME}.items()},
+    "touchdown_phase": _OUTCOME["touchdown_phase"]._replace(dimensions=(), need=RECOMMENDED),
+    "evaluations": Variable((), "i8", "1", "evaluations of the force", need=RECOMMENDED),
+    "time": Variable(_TIME, "f8", "s", "time since the launch", COORDINATE),
+    "axis": Variable(("axis",), "i1", "1", "Cartesian axis, z up", LABELS, "x, y, z"),
+    "node": Variable(("node",), "i1", "1", "node, numbered as in cube.m", COORDINATE, "1 to 8", OPTIONAL),
+}
+
+_FRONTIER_VARIABLES = {
+    "first_pass": Variable(_EDGES, "f8", "1", "fewest steps at which every member passes", note="NaN if none"),
+    "last_fail": Variable(_EDGES, "f8", "1", "most steps at which a member still fails", note="NaN if none"),
+    "steps_needed": Variable(
+        _EDGES, "f8", "1", "fewest scanned steps from which on every member passes", note="NaN if none"
+    ),
+    "flips": Variable(_EDGES, "f8", "1", "changes between pass and fail along the scan"),
+    "limit": Variable(("stiffness",), "f8", "1", "steps at the linear stability limit, omega h = 2"),
+    "pass_fraction": Variable(_SCAN, "f8", "1", "share of a cell's members that pass the criterion"),
+    "pass_fraction_low": Variable(_SCAN, "f8", "1", "lower end of its 95 % confidence interval", note="Wilson's"),
+    "pass_fraction_high": Variable(_SCAN, "f8", "1", "upper end of its 95 % confidence interval"),
+    "tolerance": _TOLERANCE,
+    "exponent": Variable(_FIT, "f8", "1", "exponent of the power law", note="NaN with fewer than three points"),
+    "exponent_error": Variable(_FIT, "f8", "1", "standard error of it"),
+    "factor": Variable(_FIT, "f8", "1", "steps at stiffness 1 kg s-2 by the power law"),
+    "scatter": Variable(_FIT, "f8", "1", "standard deviation of log10 of the steps about the power law"),
+    "centre": Variable(_FIT, "f8", "kg s-2", "geometric mean of the stiffnesses in the fit"),
+    "points": Variable(_FIT, "f8", "1", "number of stiffnesses in the fit"),
+    "contact": Variable(("contact",), "i1", "1", "contact law", LABELS),
+    "criterion": _CRITERION,
+    "edge": Variable(("edge",), "i1", "1", "edge of a criterion", LABELS, "first_pass, last_fail, steps_needed"),
+    "stiffness": Variable(("stiffness",), "f8", "kg s-2", "ground stiffness", COORDINATE, "per node"),
+    **{f"cell_{name}": part for name, part in _CELLS.items()},
 }
 
 KINDS: dict[str, Kind] = {
     "run": Kind(
         {
             **_SIMULATOR,
-            "steps": Attribute(WHOLE),
-            "step_size": Attribute(NUMBER),
-            "omega_h": Attribute(NUMBER),
-            "criteria": Attribute(TEXT),
-            "tolerance": Attribute(NUMBER, RECOMMENDED),
-            "hop_height": Attribute(NUMBER, RECOMMENDED),
-            "scene_derived": Attribute(TEXT, OPTIONAL),
+            "steps": Attribute(WHOLE, "number of time steps of the run"),
+            "step_size": Attribute(NUMBER, "duration/steps, in the unit of `step_size_units` (s)"),
+            "omega_h": Attribute(NUMBER, "contact frequency of a flat landing times step size"),
+            "criteria": Attribute(TEXT, _CRITERIA),
+            "tolerance": Attribute(NUMBER, "of the error, for a scheme that controls its own", RECOMMENDED),
+            "hop_height": _HOP_HEIGHT,
+            "scene_derived": Attribute(
+                TEXT,
+                "values of the scene that were given in other words (a side for a radius, a restitution for a damping),"
+                " and from what; the values themselves are in `scene`",
+                OPTIONAL,
+            ),
         },
-        {
-            "time": Variable(_TIME, "f8", "s"),
-            "axis": Variable(("axis",), "i1"),
-            "step": Variable(_TIME, "i8"),
-            "position": Variable(_PLACE, "f8", "m"),
-            "velocity": Variable(_PLACE, "f8", "m s-1"),
-            "kinetic_energy": Variable(_TIME, "f8", "J"),
-            "potential_energy": Variable(_TIME, "f8", "J"),
-            "elastic_energy": Variable(_TIME, "f8", "J"),
-            "energy_paper": Variable(_TIME, "f8", "J"),
-            "mechanical_energy": Variable(_TIME, "f8", "J", RECOMMENDED),
-            "verdict": Variable((), "i1"),
-            "ending": Variable((), "i1", need=RECOMMENDED),
-            "steps_done": Variable((), "i8"),
-            "out_of_range": Variable((), "f8"),
-            "evaluations": Variable((), "i8", need=RECOMMENDED),
-            "touchdown_phase": Variable((), "f8", need=RECOMMENDED),
-            "node": Variable(("node",), "i1", need=OPTIONAL),
-            "angular_momentum": Variable(_PLACE, "f8", "kg m2 s-1", OPTIONAL),
-            "node_offset": Variable(("time", "node", "axis"), "f8", "m", OPTIONAL),
-        },
+        _RUN_VARIABLES,
     ),
     "shard": Kind(
         _OF_RUNS,
         {
+            "out_of_range": _OUT_OF_RANGE,
+            "energy_ratio": Variable(_RUN, "f8", "1", "measure of criterion energy"),
+            "apex_ratio": Variable(_RUN, "f8", "1", "measure of criterion apex"),
+            "restitution_error": Variable(_RUN, "f8", "1", "measure of criterion restitution"),
+            "trajectory_error": Variable(_RUN, "f8", "1", "measure of criterion trajectory"),
+            **_OUTCOME,
+            "steps_computed": Variable(_RUN, "i8", "1", "steps computed one by one, not many at once"),
+            "decided": Variable(
+                (*_RUN, "criterion"), "i8", "1", "step that decided the criterion, 0 if none before the end"
+            ),
             **_CELLS,
-            "member": Variable(("member",), "i4"),
-            "out_of_range": Variable(_RUN, "f8"),
-            "energy_ratio": Variable(_RUN, "f8"),
-            "apex_ratio": Variable(_RUN, "f8"),
-            "restitution_error": Variable(_RUN, "f8"),
-            "trajectory_error": Variable(_RUN, "f8"),
-            "touchdown_phase": Variable(_RUN, "f8"),
-            "verdict": Variable(_RUN, "i1"),
-            "ending": Variable(_RUN, "i1", need=RECOMMENDED),
-            "steps_done": Variable(_RUN, "i8"),
-            "steps_computed": Variable(_RUN, "i8"),
-            "decided": Variable((*_RUN, "criterion"), "i8"),
+            "member": Variable(
+                ("member",), "i4", "1", "member: number k of n is launched k/n of a time step late", COORDINATE
+            ),
+            "criterion": _CRITERION,
         },
     ),
     "sweep": Kind(
         {**_OF_RUNS, **_JUDGED},
         {
+            "failing": Variable(_SCAN, "i4", "1", "number of members that fail the criterion"),
+            "verdicts": Variable(("cell", "verdict"), "i4", "1", "number of members that ended with a verdict"),
+            "steps_computed": Variable(_CELL, "i8", "1", "steps computed one by one, of all members"),
+            "tolerance": _TOLERANCE,
             **_CELLS,
-            "failing": Variable(_SCAN, "i4"),
-            "verdict": Variable(("verdict",), "i1"),
-            "verdicts": Variable(("cell", "verdict"), "i4"),
-            "steps_computed": Variable(_CELL, "i8"),
-            "tolerance": Variable(("criterion",), "f8"),
+            "criterion": _CRITERION,
+            "verdict": Variable(("verdict",), "i1", "1", "verdict", LABELS),
         },
     ),
     "frontier": Kind(
-        {**_OF_RUNS, **_JUDGED, "analysis_code_digest": Attribute(TEXT)},
         {
-            "contact": Variable(("contact",), "i1"),
-            "criterion": Variable(("criterion",), "i1"),
-            "stiffness": Variable(("stiffness",), "f8", "kg s-2"),
-            "edge": Variable(("edge",), "i1"),
-            **{name: Variable(_EDGES, "f8") for name in ("first_pass", "last_fail", "steps_needed", "flips")},
-            "limit": Variable(("stiffness",), "f8"),
-            "tolerance": Variable(("criterion",), "f8"),
-            **{f"pass_fraction{end}": Variable(_SCAN, "f8") for end in ("", "_low", "_high")},
-            **{name: Variable(_FIT, "f8") for name in ("exponent", "exponent_error", "factor", "scatter", "points")},
-            "centre": Variable(_FIT, "f8", "kg s-2"),
-            **{f"cell_{name}": _CELLS[name] for name in ("contact", "stiffness", "steps", "omega_h")},
+            **_OF_RUNS,
+            **_JUDGED,
+            "analysis_code_digest": Attribute(TEXT, "SHA-256 of the source that found the edges"),
         },
+        _FRONTIER_VARIABLES,
     ),
     "experiment": Kind({}, {}),
-    "timing": Kind({"machine_processor": Attribute(TEXT), "measured_at": Attribute(TEXT)}, {}),
+    "timing": Kind(_MACHINE, {}),
     "bench": Kind(
-        {"machine_processor": Attribute(TEXT), "measured_at": Attribute(TEXT), "bench_code_digest": Attribute(TEXT)},
-        {"round": Variable(("round",), "i4")},
+        {**_MACHINE, "bench_code_digest": Attribute(TEXT, "SHA-256 of the benchmarks' source")},
+        {"round": Variable(("round",), "i4", "1", "round, in which the cases take turns", COORDINATE)},
     ),
 }
 
-# Files of earlier versions say less of themselves.
-_WITHOUT_KIND = ("1.0", "1.1")
+
+def attributes_of(kind: str, name: str, meanings: Sequence[str] | None = None) -> dict[str, Any]:
+    """Return the attributes of a variable; meanings: the words of an enum."""
+    variable = KINDS[kind].variables[name]
+    if meanings is not None:
+        return enum_attributes(variable.long_name, meanings)
+    return {"long_name": variable.long_name, "units": variable.units}
+
+
+def dataset(
+    kind: str, values: Mapping[str, Any], meanings: Mapping[str, Sequence[str]], attributes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return a dataset of one kind.
+
+    values: of each variable by name, in the order in which they are stored; a tuple (dimensions, values, attributes)
+    for one that the table does not have. meanings: the words of enums, by name. attributes: of the file.
+    """
+    known = KINDS[kind].variables
+    variables = {
+        name: given
+        if isinstance(given, tuple)
+        else (known[name].dimensions, given, attributes_of(kind, name, meanings.get(name)))
+        for name, given in values.items()
+    }
+    coordinates = {name: variables.pop(name) for name in values if name in known and COORDINATE in known[name].role}
+    return xr.Dataset(variables, coordinates, attributes)
 
 
 def problems(dataset: xr.Dataset) -> list[str]:
-    """Return what of a file is not as its kind asks, a line each; none for files of before there were kinds.
+    """Return what of a file is not as its kind demands, a line each; none for files older than kinds.
 
-    What all files have in common, reading checks: structure, units, enums, the scene against its digest.
+    What all files have in common is checked when they are read: structure, units, enums, the scene's digest.
     """
-    if dataset.attrs.get("format_version") in _WITHOUT_KIND:
+    version = _numbers(dataset.attrs.get("format_version", FORMAT_VERSION))
+    if version < _numbers("1.2"):
         return []
     kind = dataset.attrs.get("kind")
     if kind not in KINDS:
         return [f"attribute kind = {kind}: allowed is {' or '.join(KINDS)}"]
     return [
-        *_missing_attributes(dataset, {**ATTRIBUTES, **KINDS[kind].attributes}),
-        *_missing_variables(dataset, KINDS[kind].variables),
+        *_wrong_attributes(dataset, {**ATTRIBUTES, **KINDS[kind].attributes}),
+        *_wrong_variables(dataset, KINDS[kind].variables, version),
         *_wrong_config(dataset),
     ]
 
 
-def _missing_attributes(dataset: xr.Dataset, asked: Mapping[str, Attribute]) -> Iterator[str]:
-    for name, attribute in asked.items():
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(map(int, version.split(".")))
+
+
+def _wrong_attributes(dataset: xr.Dataset, known: Mapping[str, Attribute]) -> Iterator[str]:
+    for name, attribute in known.items():
         if name not in dataset.attrs:
             if attribute.need == REQUIRED:
                 yield f"attribute {name} is missing"
@@ -216,10 +341,10 @@ def _is(kind: str, value: Any) -> bool:
     return bool(np.isfinite(value))
 
 
-def _missing_variables(dataset: xr.Dataset, asked: Mapping[str, Variable]) -> Iterator[str]:
-    for name, variable in asked.items():
+def _wrong_variables(dataset: xr.Dataset, known: Mapping[str, Variable], version: tuple[int, ...]) -> Iterator[str]:
+    for name, variable in known.items():
         if name not in dataset.variables:
-            if variable.need == REQUIRED:
+            if variable.need == REQUIRED and version >= _numbers(variable.since):
                 yield f"variable {name} is missing"
             continue
         found = dataset[name]

@@ -141,7 +141,7 @@ def simulate(
     """Run a scene and return the verdict, the measures and, if asked, the trajectory.
 
     scene: the problem. model: vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene.
-    simulator: stiffdice, or an engine that is installed (docs/peers.md), which takes every step, one member after
+    simulator: stiffdice, or an engine that is installed (docs/engines.md), which takes every step, one member after
     another. scheme: None takes symplectic_euler, or an engine's own. steps: number of time steps to the scene's
     duration. tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are then
     the intervals after which a state is known. every: keep every K-th state, from the launch on; None keeps none.

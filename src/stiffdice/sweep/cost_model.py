@@ -236,7 +236,7 @@ def prediction(
 def _alike(scheme: str, ball: _Ball, h: Array) -> list[tuple[Flags, _Ball]]:
     """Return cells that bounce alike, each with its ball: a scheme that damps gives back less, the longer its steps.
 
-    Implicit Euler gives back exp(−π ωh/2) of the speed (docs/peers.md), here to second order.
+    Implicit Euler gives back exp(−π ωh/2) of the speed (docs/engines.md), here to second order.
     """
     if scheme not in DAMPED:
         return [(np.full(h.shape, True), ball)]

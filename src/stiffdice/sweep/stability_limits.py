@@ -18,26 +18,14 @@ import xarray as xr
 from stiffdice import __version__
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.code_digest import code_digest
-from stiffdice.io.cf_enums import enum_attributes, meanings_of
+from stiffdice.dynamics.contact import LAWS
+from stiffdice.io import schema
+from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
-from stiffdice.simulation import dataset
 
-# What a scan has edges of, and what they are.
-EDGES = {
-    "first_pass": "fewest steps at which every member passes",
-    "last_fail": "most steps at which a member still fails",
-    "steps_needed": "fewest scanned steps from which on every member passes",
-}
-
-# A power law through an edge, and how sure it is.
-FIT = {
-    "exponent": "exponent of the power law",
-    "exponent_error": "standard error of it",
-    "factor": "steps at stiffness 1 kg s-2 by the power law",
-    "scatter": "standard deviation of log10 of the steps about the power law",
-    "centre": "geometric mean of the stiffnesses in the fit",
-    "points": "number of stiffnesses in the fit",
-}
+# What a scan has edges of, and the numbers of a power law through an edge (`io.schema`).
+EDGES = ("first_pass", "last_fail", "steps_needed")
+FIT = ("exponent", "exponent_error", "factor", "scatter", "centre", "points")
 
 Values = npt.NDArray[np.float64]
 
@@ -146,7 +134,6 @@ def _dataset(
     found: Mapping[str, Values],
     fits: Mapping[str, Values],
 ) -> xr.Dataset:
-    grid = ("contact", "criterion", "stiffness")
     scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
     limits = [
         linear_theory.steps_for(scene.with_ground(stiffness=value), linear_theory.STABILITY_LIMIT)
@@ -155,30 +142,25 @@ def _dataset(
     members = int(sweep.attrs["members"])
     passing = members - sweep.failing.values.astype(np.int64)
     low, high = confidence(passing, members)
-    scan = ("criterion", "cell")
-    described: dict[str, tuple[Any, Any, str]] = {
-        **{name: (grid, found[name], meaning) for name, meaning in EDGES.items()},
-        "flips": (grid, found["flips"], "changes between pass and fail along the scan"),
-        "limit": ("stiffness", limits, "steps at the linear stability limit, omega h = 2"),
-        "pass_fraction": (scan, passing / members, "share of a cell's members that pass the criterion"),
-        "pass_fraction_low": (scan, low, "lower end of its 95 % confidence interval"),
-        "pass_fraction_high": (scan, high, "upper end of its 95 % confidence interval"),
-        "tolerance": ("criterion", sweep.tolerance.values, "tolerance of the criterion"),
-        **{name: ((*grid[:2], "edge"), fits[name], meaning) for name, meaning in FIT.items()},
+    values: dict[str, Any] = {
+        **found,
+        "limit": limits,
+        "pass_fraction": passing / members,
+        "pass_fraction_low": low,
+        "pass_fraction_high": high,
+        "tolerance": sweep.tolerance.values,
+        **fits,
+        "contact": laws,
+        "criterion": sweep.criterion.values,
+        "edge": np.arange(len(EDGES), dtype=np.int8),
+        "stiffness": stiffnesses,
+        **{f"cell_{name}": sweep[name].values for name in ("contact", "stiffness", "steps", "omega_h")},
     }
-    variables: dict[str, Any] = {
-        name: (dims, values, {"long_name": meaning, "units": "kg s-2" if name == "centre" else "1"})
-        for name, (dims, values, meaning) in described.items()
-    }
-    coordinates: dict[str, Any] = {
-        "contact": ("contact", laws, dataset.CONTACT_ATTRIBUTES),
-        "criterion": ("criterion", sweep.criterion.values, sweep.criterion.attrs),
-        "edge": ("edge", np.arange(len(EDGES), dtype=np.int8), enum_attributes("edge of a criterion", list(EDGES))),
-        "stiffness": ("stiffness", stiffnesses, dataset.CELL_ATTRIBUTES["stiffness"]),
-    }
-    coordinates |= {
-        f"cell_{name}": ("cell", sweep[name].values, sweep[name].attrs)
-        for name in ("contact", "stiffness", "steps", "omega_h")
+    meanings = {
+        "contact": list(LAWS),
+        "cell_contact": list(LAWS),
+        "criterion": meanings_of(sweep.criterion),
+        "edge": EDGES,
     }
     attributes = sweep.attrs | {
         "title": "Edges of stability",
@@ -186,7 +168,7 @@ def _dataset(
         "stiffdice_version": __version__,
         "analysis_code_digest": code_digest("stiffdice.sweep.stability_limits"),
     }
-    return xr.Dataset(variables, coordinates, attributes)
+    return schema.dataset("frontier", values, meanings, attributes)
 
 
 def table(frontier: xr.Dataset) -> str:

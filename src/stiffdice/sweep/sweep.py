@@ -15,6 +15,7 @@ from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError, RefusedError
+from stiffdice.io import schema
 from stiffdice.io.content_digest import CELL, cell_digests, digest_of_cells
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 from stiffdice.scene.scene import Scene
@@ -29,6 +30,9 @@ from stiffdice.sweep.grid import Column, Piece, Sweep
 
 # What a shard keeps of each run besides the measures.
 _OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
+
+# Words of the enums of shards and sweeps.
+_MEANINGS = {"contact": list(LAWS), "verdict": dataset.VERDICTS, "ending": dataset.VERDICTS}
 
 # Members computed together: their references are in memory together.
 BLOCK = CHUNK_MEMBERS
@@ -131,21 +135,19 @@ def _run_values(run: Run) -> dict[str, Any]:
 
 def pattern(sweep: Sweep) -> xr.Dataset:
     """Return one cell with all names, types, units and attributes of the sweep's shards, and no values of its own."""
-    column = sweep.columns()[0]
-    runs = dataset.run_variables(sweep.members)
-    member = np.arange(sweep.members, dtype=np.int32)
-    coordinates = {
-        name: ("cell", value, dataset.CELL_ATTRIBUTES[name]) for name, value in _cell_values(sweep, column, [1]).items()
+    sizes = {"cell": 1, "member": sweep.members, "criterion": len(criteria.CRITERIA)}
+    values: dict[str, Any] = {
+        name: (("cell", "member"), np.zeros((1, sweep.members)), attributes)
+        for name, attributes in dataset.MEASURE_ATTRIBUTES.items()
     } | {
-        "member": ("member", member, dataset.MEMBER_ATTRIBUTES),
-        "criterion": (
-            "criterion",
-            np.arange(len(criteria.CRITERIA), dtype=np.int8),
-            dataset.criterion_attributes(list(criteria.CRITERIA)),
-        ),
+        name: np.zeros([sizes[dimension] for dimension in part.dimensions], part.type)
+        for name, part in schema.KINDS["shard"].variables.items()
+        if name not in dataset.MEASURE_ATTRIBUTES
     }
+    values |= _cell_values(sweep, sweep.columns()[0], [1])
+    values |= {name: np.arange(sizes[name], dtype=values[name].dtype) for name in ("member", "criterion")}
     attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
-    return xr.Dataset(runs, coordinates, attributes)
+    return schema.dataset("shard", values, _MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
 
 
 def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
@@ -263,43 +265,22 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     measures = {part.MEASURE: runs[part.MEASURE].values for part in criteria.CRITERIA.values()}
     verdicts = runs["verdict"].values
     counts = np.stack([(verdicts == verdict).sum(axis=1) for verdict in Verdict], axis=1)
-    asked = list(tolerances)
-    variables: dict[str, Any] = {
-        "failing": (
-            ("criterion", "cell"),
-            (~judge.passes(tolerances, measures, runs["ending"].values)).sum(axis=-1).astype(np.int32),
-            {"long_name": "number of members that fail the criterion", "units": "1"},
-        ),
-        "verdicts": (
-            ("cell", "verdict"),
-            counts.astype(np.int32),
-            {"long_name": "number of members that ended with a verdict", "units": "1"},
-        ),
-        "steps_computed": (
-            "cell",
-            runs["steps_computed"].values.sum(axis=1),
-            {"long_name": "steps computed one by one, of all members", "units": "1"},
-        ),
-        "tolerance": (
-            "criterion",
-            list(tolerances.values()),
-            {"long_name": "tolerance of the criterion", "units": "1"},
-        ),
-    } | {
-        f"largest_{name}": (
-            "cell",
-            _largest(measures[name]),
-            {"long_name": f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}", "units": "1"},
-        )
-        for name in (criteria.CRITERIA[criterion].MEASURE for criterion in asked)
+    values: dict[str, Any] = {
+        "failing": (~judge.passes(tolerances, measures, runs["ending"].values)).sum(axis=-1).astype(np.int32),
+        "verdicts": counts.astype(np.int32),
+        "steps_computed": runs["steps_computed"].values.sum(axis=1),
+        "tolerance": list(tolerances.values()),
     }
-    coordinates: dict[str, Any] = {
-        name: ("cell", runs[name].values, dataset.CELL_ATTRIBUTES[name]) for name in dataset.CELL_ATTRIBUTES
-    } | {
-        "criterion": ("criterion", np.arange(len(asked), dtype=np.int8), dataset.criterion_attributes(asked)),
-        "verdict": ("verdict", np.arange(len(Verdict), dtype=np.int8), dataset.VERDICT_ATTRIBUTES),
+    for name in (criteria.CRITERIA[criterion].MEASURE for criterion in tolerances):
+        long_name = f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}"
+        values[f"largest_{name}"] = "cell", _largest(measures[name]), {"long_name": long_name, "units": "1"}
+    values |= {name: runs[name].values for name in dataset.CELL_ATTRIBUTES}
+    values |= {
+        "criterion": np.arange(len(tolerances), dtype=np.int8),
+        "verdict": np.arange(len(Verdict), dtype=np.int8),
     }
-    return xr.Dataset(variables, coordinates, dict(runs.attrs) | {"members": runs.sizes["member"]})
+    attributes = dict(runs.attrs) | {"members": runs.sizes["member"]}
+    return schema.dataset("sweep", values, _MEANINGS | {"criterion": list(tolerances)}, attributes)
 
 
 def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 from stiffdice.errors import InputError
+from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.report.tables import paper_questions
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -31,7 +32,7 @@ def frontier(stiffness, steps, failing, criterion="apex"):
             "tolerance": ("criterion", [0.02]),
         },
         {name: ("cell", values, dataset.CELL_ATTRIBUTES[name]) for name, values in cells.items()}
-        | {"criterion": ("criterion", np.zeros(1, np.int8), dataset.criterion_attributes([criterion]))},
+        | {"criterion": ("criterion", np.zeros(1, np.int8), enum_attributes("criterion", [criterion]))},
         dataset.provenance_attributes("A scan", Scene(), "sliding", "symplectic_euler", "stiffdice.sweep.sweep")
         | {"members": MEMBERS},
     )
