@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from stiffdice.advice.pilot import SAMPLES, curve
 from stiffdice.advice.result import Advice, Option
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.simulation.run import Run, simulate
-
-Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Check:
         return self.found <= self.promised
 
 
-def run_advised(advice: Advice, option: Option, progress: Progress | None = None) -> Run:
+def run_advised(advice: Advice, option: Option, progress: Callable[[float], None] | None = None) -> Run:
     """Return the run of an option, with its trajectory: up to 10,000 states.
 
     advice: what `advise` returned. option: one of its options. progress: called with the fraction done, some times a
@@ -39,7 +38,7 @@ def run_advised(advice: Advice, option: Option, progress: Progress | None = None
     return _run(advice, option.scheme, option.steps, option.tolerance, progress)
 
 
-def check(advice: Advice, run: Run, progress: Progress | None = None) -> Check:
+def check(advice: Advice, run: Run, progress: Callable[[float], None] | None = None) -> Check:
     """Compare a run of the advised scene with one of about twice the cost, and with the pilot's by other methods.
 
     A scheme of fixed steps is run at half the step: of a first-order error that shows one half, which is made good.
@@ -51,9 +50,9 @@ def check(advice: Advice, run: Run, progress: Progress | None = None) -> Check:
         finer = _run(advice, run.scheme, 2 * run.steps, None, progress)
         against = f"{run.scheme} with {2 * run.steps:,} steps"
     seen = 1.0 if run.scheme in ("event", "exact") else 2.0
-    places, radius = run.states(SAMPLES)["position"], advice.scene.cube.radius
+    places, radius = states_of(run, SAMPLES)["position"], advice.scene.cube.radius
     # Infinite where one ended early.
-    found = [seen * float(curve(places, finer.states(SAMPLES)["position"], radius)[-1])]
+    found = [seen * float(curve(places, states_of(finer, SAMPLES)["position"], radius)[-1])]
     for path in advice.paths:
         if path.scheme != run.scheme:
             found.append(float(curve(places, path.places, radius)[-1]))
@@ -61,7 +60,7 @@ def check(advice: Advice, run: Run, progress: Progress | None = None) -> Check:
     return Check(run, advice.asked, max(found), against)
 
 
-def _finer(advice: Advice, run: Run, progress: Progress | None) -> tuple[Run, str]:
+def _finer(advice: Advice, run: Run, progress: Callable[[float], None] | None) -> tuple[Run, str]:
     """Return a run of `event` of at least twice the evaluations, or the finest; and how to call it."""
     tolerance, many, cost = run.tolerance, 1, 0.0
     while cost < 2 and many == 1:
@@ -74,7 +73,9 @@ def _finer(advice: Advice, run: Run, progress: Progress | None) -> tuple[Run, st
     return finer, f"event at tolerance {tolerance:.0e}{intervals}, {cost:.2g} times the evaluations"
 
 
-def _run(advice: Advice, scheme: str, steps: int, tolerance: float | None, progress: Progress | None) -> Run:
+def _run(
+    advice: Advice, scheme: str, steps: int, tolerance: float | None, progress: Callable[[float], None] | None
+) -> Run:
     return simulate(
         advice.scene,
         model=advice.model,

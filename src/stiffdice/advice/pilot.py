@@ -19,6 +19,7 @@ import numpy.typing as npt
 from stiffdice.dynamics.model_selection import least_model
 from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.state import Array
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS
@@ -156,7 +157,7 @@ def tried(
         run.scheme,
         steps,
         tolerance,
-        run.states(SAMPLES)["position"],
+        states_of(run, SAMPLES)["position"],
         int(run.evaluations[0]),
         int(run.steps_computed[0]),
         seconds,

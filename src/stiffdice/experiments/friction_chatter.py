@@ -19,6 +19,7 @@ from stiffdice.errors import InputError
 from stiffdice.experiments import options
 from stiffdice.experiments.layout import quantity
 from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
+from stiffdice.experiments.sampling import states_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -91,4 +92,4 @@ def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
     still = STARTS["at_rest"](flat.with_ground(friction=friction))
     sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
     run = simulate(dataclasses.replace(sliding, duration=h * steps), model=MODEL, scheme=SCHEME, steps=steps, every=1)
-    return float(np.abs(run.states(steps)["velocity"][-_LAST:, 0]).max())
+    return float(np.abs(states_of(run, steps)["velocity"][-_LAST:, 0]).max())

@@ -18,6 +18,7 @@ from stiffdice.dynamics.state import STATE, Array, Ensemble, States
 from stiffdice.experiments import options
 from stiffdice.experiments.layout import of_cells, quantity
 from stiffdice.experiments.placement import relaunched
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -104,7 +105,7 @@ def _by_event(scene: Scene, launch: States, tolerance: float) -> tuple[Array, in
     """Return the same by `event`."""
     members = Ensemble(launch, np.zeros(1))
     run = simulate(scene, model=MODEL, scheme=SCHEME, steps=SAMPLES, every=1, tolerance=tolerance, members=members)
-    return run.states(SAMPLES)["position"][1:], int(run.evaluations[0])
+    return states_of(run, SAMPLES)["position"][1:], int(run.evaluations[0])
 
 
 def _apart(scene: Scene, one: Array, other: Array) -> float:

@@ -28,6 +28,7 @@ from stiffdice.experiments import options
 from stiffdice.experiments.bisection import bisected
 from stiffdice.experiments.layout import Variable, enum, quantity
 from stiffdice.experiments.placement import level
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
@@ -310,7 +311,7 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
         steps=steps,
         every=1,
     )
-    state, upright = run.states(steps), scene.cube.node_offsets()
+    state, upright = states_of(run, steps), scene.cube.node_offsets()
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
     gone = np.flatnonzero(np.abs(heights + sag).max(axis=1) > _FOLLOWED * sag)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -20,7 +20,6 @@ from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend

@@ -102,18 +102,6 @@ class Run:
     end: States
     trajectory: Trajectory | None
 
-    def states(self, parts: int) -> States:
-        """Return the states at the launch and after equal parts of the duration, shape (parts + 1,).
-
-        Those after the run's end are not-a-number. Raises InputError for a run without states at these times.
-        """
-        if self.trajectory is None:
-            raise InputError("run: has no trajectory; simulate(..., every=K) keeps one")
-        states = np.full(parts + 1, np.nan, STATE)
-        known = self.trajectory.state[self.trajectory.step % (self.steps // parts) == 0]
-        states[: len(known)] = known
-        return states
-
 
 def default_every(steps: int) -> int:
     """Return the K that keeps at most 10,000 samples of a run."""

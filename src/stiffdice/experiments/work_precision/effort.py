@@ -14,6 +14,7 @@ import numpy as np
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.experiments.layout import EFFORT_GRID, EFFORTS, Variable, quantity
+from stiffdice.experiments.sampling import states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
@@ -120,7 +121,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
     )
     computed = int(run.evaluations[0])
     stages = computed / max(1, int(run.steps_computed[0]))
-    return Path(run.states(SAMPLES), round(stages * effort.steps), computed)
+    return Path(states_of(run, SAMPLES), round(stages * effort.steps), computed)
 
 
 def lead(scene: Scene, method: str, effort: Effort) -> float:
