@@ -11,7 +11,7 @@ import pytest
 
 from stiffdice.io import schema
 from stiffdice.io.reader import open_file
-from stiffdice.io.schema import FORMAT_VERSION
+from stiffdice.io.structure_check import FORMAT_VERSION
 
 PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
 

@@ -9,7 +9,7 @@ import pytest
 
 from stiffdice.io import schema
 from stiffdice.io.reader import open_file
-from stiffdice.io.schema import FORMAT_VERSION
+from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.report import file_page
 
 FORMATS = Path(__file__).parents[1] / "reference" / "formats"

@@ -20,7 +20,7 @@ from PIL import Image
 from tests import rounds
 
 from stiffdice.io.reader import open_file, parts
-from stiffdice.io.schema import FORMAT_VERSION
+from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.scene import load
 from stiffdice.simulation.run import simulate
 from stiffdice.study import config as studies

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io import attribute_check, seal, structure_check
+from stiffdice.io import seal, structure_check
 from stiffdice.io.structure_check import Contents
 
 
@@ -27,7 +27,7 @@ def opened(path: str | Path) -> Iterator[tuple[h5py.File, Contents]]:
     if sealed:
         seal.check(place)
     with h5py.File(place, "r") as file:
-        attribute_check.check_version(file, sealed)
+        structure_check.check_version(file, sealed)
         yield file, structure_check.check(file, about.st_size)
 
 
@@ -43,7 +43,7 @@ def told(path: str | Path) -> Iterator[None]:
     except (OSError, LookupError, ValueError, RuntimeError, TypeError, ArithmeticError) as error:
         if isinstance(error, OSError) and error.strerror:
             raise InputError(f"{path}: {error.strerror}") from None
-        reason = attribute_check.shown(str(error).splitlines()[0] if str(error) else type(error).__name__)
+        reason = structure_check.shown(str(error).splitlines()[0] if str(error) else type(error).__name__)
         raise RefusedError(f"{path}: not a readable HDF5 file ({reason})") from None
 
 

@@ -12,9 +12,7 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.io.cf_enums import enum_attributes
-
-# The part before the dot changes when an older reader could not understand a file.
-FORMAT_VERSION = "1.3"
+from stiffdice.io.structure_check import FORMAT_VERSION
 
 # How much a reader may count on something.
 REQUIRED, RECOMMENDED, OPTIONAL = "required", "recommended", "optional"
@@ -39,8 +37,8 @@ class Variable(NamedTuple):
 
     dimensions: tuple[str, ...]
     type: str
-    units: str
     long_name: str
+    units: str = "1"
     role: str = ""
     note: str = ""
     need: str = REQUIRED
@@ -121,89 +119,83 @@ _EDGES, _FIT = ("contact", "criterion", "stiffness"), ("contact", "criterion", "
 _SCAN = ("criterion", "cell")
 
 _CELLS = {
-    "contact": Variable(_CELL, "i1", "1", "contact law", LABELS),
-    "stiffness": Variable(_CELL, "f8", "kg s-2", "ground stiffness", COORDINATE, "per node"),
-    "steps": Variable(_CELL, "i8", "1", "number of time steps", COORDINATE),
-    "omega_h": Variable(_CELL, "f8", "1", "contact frequency of a flat landing times step size", COORDINATE),
+    "contact": Variable(_CELL, "i1", "contact law", role=LABELS),
+    "stiffness": Variable(_CELL, "f8", "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
+    "steps": Variable(_CELL, "i8", "number of time steps", role=COORDINATE),
+    "omega_h": Variable(_CELL, "f8", "contact frequency of a flat landing times step size", role=COORDINATE),
 }
-_CRITERION = Variable(("criterion",), "i1", "1", "criterion", LABELS)
-_TOLERANCE = Variable(("criterion",), "f8", "1", "tolerance of the criterion")
+_CRITERION = Variable(("criterion",), "i1", "criterion", role=LABELS)
+_TOLERANCE = Variable(("criterion",), "f8", "tolerance of the criterion")
 
 # Of a run, in its own file without dimensions. The long_name of a measure is its criterion's.
 _OUTCOME = {
     "touchdown_phase": Variable(
-        _RUN, "f8", "1", "phase of the first touch-down within its time step", note="NaN if there is none"
+        _RUN, "f8", "phase of the first touch-down within its time step", note="NaN if there is none"
     ),
-    "verdict": Variable(_RUN, "i1", "1", "verdict", ENUM, "the gravest of the criteria broken and of `ending`"),
+    "verdict": Variable(_RUN, "i1", "verdict", role=ENUM, note="the gravest of the criteria broken and of `ending`"),
     "ending": Variable(
         _RUN,
         "i1",
-        "1",
         "how the run ended whatever it was asked, passed if well",
-        ENUM,
-        "a run that did not end well passes no criterion",
+        role=ENUM,
+        note="a run that did not end well passes no criterion",
         since="1.3",
     ),
-    "steps_done": Variable(_RUN, "i8", "1", "steps done when the run ended"),
+    "steps_done": Variable(_RUN, "i8", "steps done when the run ended"),
 }
-_OUT_OF_RANGE = Variable(_RUN, "f8", "1", "1 if a number left the range of doubles")
+_OUT_OF_RANGE = Variable(_RUN, "f8", "1 if a number left the range of doubles")
 
 _RUN_VARIABLES = {
-    "step": Variable(_TIME, "i8", "1", "number of time steps done"),
-    "position": Variable(_PLACE, "f8", "m", "centre of mass"),
-    "velocity": Variable(_PLACE, "f8", "m s-1", "velocity of it"),
-    "kinetic_energy": Variable(_TIME, "f8", "J", "kinetic energy, of translation and rotation"),
-    "potential_energy": Variable(_TIME, "f8", "J", "potential energy m g z of the centre of mass"),
-    "elastic_energy": Variable(_TIME, "f8", "J", "energy in the ground's springs, S d²/2 per node"),
-    "energy_paper": Variable(_TIME, "f8", "J", "kinetic and potential energy, the paper's total"),
+    "step": Variable(_TIME, "i8", "number of time steps done"),
+    "position": Variable(_PLACE, "f8", "centre of mass", "m"),
+    "velocity": Variable(_PLACE, "f8", "velocity of it", "m s-1"),
+    "kinetic_energy": Variable(_TIME, "f8", "kinetic energy, of translation and rotation", "J"),
+    "potential_energy": Variable(_TIME, "f8", "potential energy m g z of the centre of mass", "J"),
+    "elastic_energy": Variable(_TIME, "f8", "energy in the ground's springs, S d²/2 per node", "J"),
+    "energy_paper": Variable(_TIME, "f8", "kinetic and potential energy, the paper's total", "J"),
     "mechanical_energy": Variable(
         _TIME,
         "f8",
-        "J",
         "kinetic, potential and elastic energy, the velocity taken at the time of the place",
+        "J",
         need=RECOMMENDED,
     ),
     "angular_momentum": Variable(
-        _PLACE, "f8", "kg m2 s-1", "angular momentum about the centre", note="where the cube turns", need=OPTIONAL
+        _PLACE, "f8", "angular momentum about the centre", "kg m2 s-1", note="where the cube turns", need=OPTIONAL
     ),
     "node_offset": Variable(
-        ("time", "node", "axis"),
-        "f8",
-        "m",
-        "node relative to the centre",
-        note="where the cube turns",
-        need=OPTIONAL,
+        ("time", "node", "axis"), "f8", "node relative to the centre", "m", note="where the cube turns", need=OPTIONAL
     ),
     **{name: part._replace(dimensions=()) for name, part in {"out_of_range": _OUT_OF_RANGE, **_OUTCOME}.items()},
     "touchdown_phase": _OUTCOME["touchdown_phase"]._replace(dimensions=(), need=RECOMMENDED),
-    "evaluations": Variable((), "i8", "1", "evaluations of the force", need=RECOMMENDED),
-    "time": Variable(_TIME, "f8", "s", "time since the launch", COORDINATE),
-    "axis": Variable(("axis",), "i1", "1", "Cartesian axis, z up", LABELS, "x, y, z"),
-    "node": Variable(("node",), "i1", "1", "node, numbered as in cube.m", COORDINATE, "1 to 8", OPTIONAL),
+    "evaluations": Variable((), "i8", "evaluations of the force", need=RECOMMENDED),
+    "time": Variable(_TIME, "f8", "time since the launch", "s", role=COORDINATE),
+    "axis": Variable(("axis",), "i1", "Cartesian axis, z up", role=LABELS, note="x, y, z"),
+    "node": Variable(("node",), "i1", "node, numbered as in cube.m", role=COORDINATE, note="1 to 8", need=OPTIONAL),
 }
 
 _FRONTIER_VARIABLES = {
-    "first_pass": Variable(_EDGES, "f8", "1", "fewest steps at which every member passes", note="NaN if none"),
-    "last_fail": Variable(_EDGES, "f8", "1", "most steps at which a member still fails", note="NaN if none"),
+    "first_pass": Variable(_EDGES, "f8", "fewest steps at which every member passes", note="NaN if none"),
+    "last_fail": Variable(_EDGES, "f8", "most steps at which a member still fails", note="NaN if none"),
     "steps_needed": Variable(
-        _EDGES, "f8", "1", "fewest scanned steps from which on every member passes", note="NaN if none"
+        _EDGES, "f8", "fewest scanned steps from which on every member passes", note="NaN if none"
     ),
-    "flips": Variable(_EDGES, "f8", "1", "changes between pass and fail along the scan"),
-    "limit": Variable(("stiffness",), "f8", "1", "steps at the linear stability limit, omega h = 2"),
-    "pass_fraction": Variable(_SCAN, "f8", "1", "share of a cell's members that pass the criterion"),
-    "pass_fraction_low": Variable(_SCAN, "f8", "1", "lower end of its 95 % confidence interval", note="Wilson's"),
-    "pass_fraction_high": Variable(_SCAN, "f8", "1", "upper end of its 95 % confidence interval"),
+    "flips": Variable(_EDGES, "f8", "changes between pass and fail along the scan"),
+    "limit": Variable(("stiffness",), "f8", "steps at the linear stability limit, omega h = 2"),
+    "pass_fraction": Variable(_SCAN, "f8", "share of a cell's members that pass the criterion"),
+    "pass_fraction_low": Variable(_SCAN, "f8", "lower end of its 95 % confidence interval", note="Wilson's"),
+    "pass_fraction_high": Variable(_SCAN, "f8", "upper end of its 95 % confidence interval"),
     "tolerance": _TOLERANCE,
-    "exponent": Variable(_FIT, "f8", "1", "exponent of the power law", note="NaN with fewer than three points"),
-    "exponent_error": Variable(_FIT, "f8", "1", "standard error of it"),
-    "factor": Variable(_FIT, "f8", "1", "steps at stiffness 1 kg s-2 by the power law"),
-    "scatter": Variable(_FIT, "f8", "1", "standard deviation of log10 of the steps about the power law"),
-    "centre": Variable(_FIT, "f8", "kg s-2", "geometric mean of the stiffnesses in the fit"),
-    "points": Variable(_FIT, "f8", "1", "number of stiffnesses in the fit"),
-    "contact": Variable(("contact",), "i1", "1", "contact law", LABELS),
+    "exponent": Variable(_FIT, "f8", "exponent of the power law", note="NaN with fewer than three points"),
+    "exponent_error": Variable(_FIT, "f8", "standard error of it"),
+    "factor": Variable(_FIT, "f8", "steps at stiffness 1 kg s-2 by the power law"),
+    "scatter": Variable(_FIT, "f8", "standard deviation of log10 of the steps about the power law"),
+    "centre": Variable(_FIT, "f8", "geometric mean of the stiffnesses in the fit", "kg s-2"),
+    "points": Variable(_FIT, "f8", "number of stiffnesses in the fit"),
+    "contact": Variable(("contact",), "i1", "contact law", role=LABELS),
     "criterion": _CRITERION,
-    "edge": Variable(("edge",), "i1", "1", "edge of a criterion", LABELS, "first_pass, last_fail, steps_needed"),
-    "stiffness": Variable(("stiffness",), "f8", "kg s-2", "ground stiffness", COORDINATE, "per node"),
+    "edge": Variable(("edge",), "i1", "edge of a criterion", role=LABELS, note="first_pass, last_fail, steps_needed"),
+    "stiffness": Variable(("stiffness",), "f8", "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
     **{f"cell_{name}": part for name, part in _CELLS.items()},
 }
 
@@ -230,18 +222,18 @@ KINDS: dict[str, Kind] = {
         _OF_RUNS,
         {
             "out_of_range": _OUT_OF_RANGE,
-            "energy_ratio": Variable(_RUN, "f8", "1", "measure of criterion energy"),
-            "apex_ratio": Variable(_RUN, "f8", "1", "measure of criterion apex"),
-            "restitution_error": Variable(_RUN, "f8", "1", "measure of criterion restitution"),
-            "trajectory_error": Variable(_RUN, "f8", "1", "measure of criterion trajectory"),
+            "energy_ratio": Variable(_RUN, "f8", "measure of criterion energy"),
+            "apex_ratio": Variable(_RUN, "f8", "measure of criterion apex"),
+            "restitution_error": Variable(_RUN, "f8", "measure of criterion restitution"),
+            "trajectory_error": Variable(_RUN, "f8", "measure of criterion trajectory"),
             **_OUTCOME,
-            "steps_computed": Variable(_RUN, "i8", "1", "steps computed one by one, not many at once"),
+            "steps_computed": Variable(_RUN, "i8", "steps computed one by one, not many at once"),
             "decided": Variable(
-                (*_RUN, "criterion"), "i8", "1", "step that decided the criterion, 0 if none before the end"
+                (*_RUN, "criterion"), "i8", "step that decided the criterion, 0 if none before the end"
             ),
             **_CELLS,
             "member": Variable(
-                ("member",), "i4", "1", "member: number k of n is launched k/n of a time step late", COORDINATE
+                ("member",), "i4", "member: number k of n is launched k/n of a time step late", role=COORDINATE
             ),
             "criterion": _CRITERION,
         },
@@ -249,13 +241,13 @@ KINDS: dict[str, Kind] = {
     "sweep": Kind(
         {**_OF_RUNS, **_JUDGED},
         {
-            "failing": Variable(_SCAN, "i4", "1", "number of members that fail the criterion"),
-            "verdicts": Variable(("cell", "verdict"), "i4", "1", "number of members that ended with a verdict"),
-            "steps_computed": Variable(_CELL, "i8", "1", "steps computed one by one, of all members"),
+            "failing": Variable(_SCAN, "i4", "number of members that fail the criterion"),
+            "verdicts": Variable(("cell", "verdict"), "i4", "number of members that ended with a verdict"),
+            "steps_computed": Variable(_CELL, "i8", "steps computed one by one, of all members"),
             "tolerance": _TOLERANCE,
             **_CELLS,
             "criterion": _CRITERION,
-            "verdict": Variable(("verdict",), "i1", "1", "verdict", LABELS),
+            "verdict": Variable(("verdict",), "i1", "verdict", role=LABELS),
         },
     ),
     "frontier": Kind(
@@ -270,7 +262,7 @@ KINDS: dict[str, Kind] = {
     "timing": Kind(_MACHINE, {}),
     "bench": Kind(
         {**_MACHINE, "bench_code_digest": Attribute(TEXT, "SHA-256 of the benchmarks' source")},
-        {"round": Variable(("round",), "i4", "1", "round, in which the cases take turns", COORDINATE)},
+        {"round": Variable(("round",), "i4", "round, in which the cases take turns", role=COORDINATE)},
     ),
 }
 

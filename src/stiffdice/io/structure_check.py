@@ -1,50 +1,65 @@
-"""What a file of ours is made of: checked with h5py alone, before a value is read, and without following a link.
+"""Whether an HDF5 file is made as ours are: checked with h5py alone, before a value is read, following no link.
 
-Nothing is said of physics here: variables at the top of the file, of plain numbers, with what netCDF-4 needs to read
-them, all of it inside the file, none of it missing, and no more in all than a file of its size may hold.
+Variables at the top of the file, of plain numbers that are stored in it; attributes of plain text and plain numbers.
+What is broken deeper in a file ends the process that reads it first (`io.isolation`).
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import re
+import unicodedata
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
-from stiffdice.errors import RefusedError
-from stiffdice.io import attribute_check
+from stiffdice.errors import RefusedError, printable
 
-MOST_VARIABLES = 1000  # the project's own files have up to 60
-MOST_DIMENSIONS = 8  # of one variable; up to 4
-MOST_CHUNKS = 50_000  # of a variable; the HDF5 library takes up to 7 kB of memory for each, however small
-LARGEST_PIECE = 2 << 20  # bytes of a chunk, or of a variable without chunks; h5py's own choice is 1 MiB at most
-MOST_BYTES = 1 << 34  # of all values of a file
+# Of the HDF5 files; the part before the dot changes when an older reader could not understand them.
+FORMAT_VERSION = "1.3"
+
 # Values in memory come to so many bytes for one of the file, or to so many in all: trajectories at rest pack well.
 MOST_RATIO, ALWAYS_ALLOWED = 100, 1 << 29
-MOST_TEXT = 10_000_000  # characters of all attributes; many may share one text in the file
 
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]*")
-# h5netcdf takes this away wherever it finds it in a name; two variables could get one name.
-_TAKEN_AWAY = "_nc4_non_coord_"
-# What h5netcdf and netCDF write in NAME of a dimension that has no values.
-_BARE = "This is a netCDF dimension but not a netCDF variable"
+_VERSION = re.compile(r"(0|[1-9][0-9]*)\.(0|[1-9][0-9]*)")
+# Versions of the format whose files had no seal.
+_UNSEALED = ("1.0", "1.1")
 
+_NUMBERS = ("int8", "int16", "int32", "int64", "float32", "float64")
+_TYPES = [
+    getattr(h5py.h5t, f"{name}{order}")
+    for name in ("STD_I8", "STD_I16", "STD_I32", "STD_I64", "IEEE_F32", "IEEE_F64")
+    for order in ("LE", "BE")
+]
 _FILTERS = {
     h5py.h5z.FILTER_SHUFFLE: "shuffle",
     h5py.h5z.FILTER_DEFLATE: "gzip",
     h5py.h5z.FILTER_FLETCHER32: "fletcher32",
 }
 
+# Which dimensions a variable has, and which variables a dimension: references, read apart or not at all.
+_REFERENCES = ("DIMENSION_LIST", "REFERENCE_LIST")
+# What netCDF-4 keeps for itself, and which variables are coordinates, which `Contents` holds apart.
+_ITS_OWN = frozenset(
+    ("CLASS", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates", "coordinates", "_NCProperties", "_nc3_strict")
+)
+# What h5netcdf and netCDF write in NAME of a dimension that has no values.
+_BARE = "This is a netCDF dimension but not a netCDF variable"
+# With these, readers change the numbers while they read them (CF, section 8.1, and xarray); our files have none.
+_CHANGING = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Unsigned", "_Encoding", "dtype")
+
 
 class Contents(NamedTuple):
     """What a checked file holds; dimensions that have no values of their own are no variables.
 
     coordinates: the names of the variables that say where the others are. meanings: how many values an enum may have,
-    by its name. sizes: bytes of a variable, by its name. dimensions: names of its axes, by its name. attributes: what
-    it says of itself, by its name; those of the file itself by none (""). What netCDF-4 keeps for itself is left out.
+    by its name. sizes: bytes of a variable, by its name. dimensions: names of its axes, by its name. attributes: those
+    of a variable by its name, those of the file itself by "", without what netCDF-4 keeps for itself.
     """
 
     coordinates: frozenset[str]
@@ -52,33 +67,6 @@ class Contents(NamedTuple):
     sizes: Mapping[str, int]
     dimensions: Mapping[str, tuple[str, ...]]
     attributes: Mapping[str, Mapping[str, Any]]
-
-
-def check(file: h5py.File, length: int) -> Contents:
-    """Return what an open file of so many bytes holds; raises RefusedError naming the variable if it is not ours."""
-    if file.userblock_size:
-        raise RefusedError(f"has {file.userblock_size} bytes before its HDF5 content; our files have none")
-    about = attribute_check.check_all("the file", file)
-    items = _items(file)
-    sizes = {name: _size_of(name, item.dataset) for name, item in items.items()}
-    total, most = sum(sizes.values()), min(MOST_BYTES, max(ALWAYS_ALLOWED, MOST_RATIO * length))
-    if total > most:
-        raise RefusedError(f"holds {_shown(total)} in a file of {_shown(length)}: allowed are {_shown(most)}")
-    for name, item in items.items():
-        _check_storage(name, item, sizes[name])
-    dimensions = _dimensions(file, items)
-    variables = {name: item for name, item in items.items() if not item.is_bare}
-    meanings = {}
-    for name, item in variables.items():
-        attribute_check.check_description(name, item.about)
-        meanings[name] = attribute_check.check_enum(name, item.about, item.dataset.dtype.kind == "i")
-    return Contents(
-        frozenset(_coordinates(file, variables)),
-        {name: count for name, count in meanings.items() if count},
-        {name: sizes[name] for name in variables},
-        {name: dimensions[name] for name in variables},
-        {"": _told(about), **{name: _told(item.about) for name, item in variables.items()}},
-    )
 
 
 class _Item(NamedTuple):
@@ -90,196 +78,180 @@ class _Item(NamedTuple):
     @property
     def is_scale(self) -> bool:
         """Whether it is a dimension: with its values, or bare."""
-        return "CLASS" in self.about
+        return self.about.get("CLASS") == "DIMENSION_SCALE"
 
     @property
     def is_bare(self) -> bool:
         """Whether it only stands for a dimension and has no values."""
-        return self.is_scale and _BARE in self.about.get("NAME", "")
+        return self.is_scale and _BARE in str(self.about.get("NAME"))
 
 
-def _items(file: h5py.File) -> dict[str, _Item]:
-    """Return every dataset with its attributes, by name; raises RefusedError where their text is too long in all."""
-    items, text = {}, 0
-    for name, dataset in _datasets(file).items():
-        items[name] = _Item(dataset, attribute_check.check_all(name, dataset))
-        text += sum(len(value) for value in items[name].about.values() if isinstance(value, str))
-        if text > MOST_TEXT:
-            raise RefusedError(f"{name}: more than {MOST_TEXT} characters in the attributes of a file")
-    return items
+def check_version(file: h5py.File, sealed: bool) -> None:
+    """Raise RefusedError unless a file is of a version of the format that this code can read.
+
+    Of the same first number all can be read, those of later programs, too: a file of a later version has more in it
+    than this code knows of, and nothing that means something else. From 1.2 on a file has a seal.
+    """
+    if "format_version" not in file.attrs:
+        raise RefusedError("has no format_version; not a file of stiffdice")
+    version = file.attrs["format_version"]
+    allowed = FORMAT_VERSION.split(".", maxsplit=1)[0]
+    if not isinstance(version, str) or not _VERSION.fullmatch(version) or version.split(".")[0] != allowed:
+        raise RefusedError(f"format_version = {shown(version)}: allowed is {allowed}.x")
+    if not sealed and version not in _UNSEALED:
+        raise RefusedError("damaged: has no seal at its end; it is cut short, or was changed by another program")
 
 
-def _datasets(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Return everything in a file, by name; raises RefusedError at what is not a dataset of its own."""
-    count = file.id.get_num_objs()
-    if count > MOST_VARIABLES:
-        raise RefusedError(f"holds {count} variables: allowed are {MOST_VARIABLES}")
-    datasets, places = {}, set()
+def check(file: h5py.File, length: int) -> Contents:
+    """Return what an open file of so many bytes holds; raises RefusedError naming the variable if it is not ours."""
+    about = _attributes("the file", file)
+    _check_scene(about)
+    items = {name: _Item(dataset, _attributes(name, dataset)) for name, dataset in _datasets(file)}
+    variables = {name: item for name, item in items.items() if not item.is_bare}
+    sizes = {name: math.prod(item.dataset.shape) * item.dataset.dtype.itemsize for name, item in variables.items()}
+    total, most = sum(sizes.values()), max(ALWAYS_ALLOWED, MOST_RATIO * length)
+    if total > most:
+        told = " MB in a file of ".join(f"{size / 1e6:.4g}" for size in (total, length))
+        raise RefusedError(f"holds {told} MB: allowed are {most / 1e6:.4g} MB")
+    dimensions = _dimensions(file, items)
+    coordinates = {name for name, item in variables.items() if item.is_scale}
+    for named in (about, *(item.about for item in variables.values())):
+        coordinates.update(word for word in str(named.get("coordinates", "")).split() if word in variables)
+    meanings = {name: _meanings(name, item) for name, item in variables.items()}
+    return Contents(
+        frozenset(coordinates),
+        {name: count for name, count in meanings.items() if count},
+        sizes,
+        {name: dimensions[name] for name in variables},
+        {"": _public(about), **{name: _public(item.about) for name, item in variables.items()}},
+    )
+
+
+def _datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
+    """Yield everything in a file with its name; raises RefusedError at what is not plain numbers stored in it."""
     for raw in file.id:
-        name = _name(raw)
+        name = raw.decode("utf-8", "replace")
+        if not _NAME.fullmatch(name):
+            raise RefusedError(f"{shown(name)}: allowed in a name are letters, digits and underscores")
         if file.id.links.get_info(raw).type != h5py.h5l.TYPE_HARD:
             raise RefusedError(f"{name}: a link that points elsewhere; our files have none")
-        about = h5py.h5o.get_info(file.id, raw)
-        if about.type != h5py.h5o.TYPE_DATASET:
-            kind = "a group" if about.type == h5py.h5o.TYPE_GROUP else "a named type"
-            raise RefusedError(f"{name}: {kind}; our files have variables alone")
-        if about.rc != 1 or about.addr in places:
-            raise RefusedError(f"{name}: one variable under two names; our files have one name for each")
-        places.add(about.addr)
-        datasets[name] = h5py.Dataset(h5py.h5d.open(file.id, raw))
-    return datasets
+        if h5py.h5o.get_info(file.id, raw).type != h5py.h5o.TYPE_DATASET:
+            raise RefusedError(f"{name}: a group or a named type; our files have variables alone")
+        dataset = h5py.Dataset(h5py.h5d.open(file.id, raw))
+        if not _is_number(dataset.id.get_type()):
+            raise RefusedError(f"{name}: its type: allowed are {', '.join(_NUMBERS)}")
+        if dataset.shape is None:
+            raise RefusedError(f"{name}: has no shape; our variables have one")
+        plan = dataset.id.get_create_plist()
+        if plan.get_external_count() or plan.get_layout() == h5py.h5d.VIRTUAL:
+            raise RefusedError(f"{name}: keeps its data outside of this file")
+        filters = [plan.get_filter(k)[0] for k in range(plan.get_nfilters())]
+        if len(set(filters)) < len(filters) or not set(filters) <= set(_FILTERS):
+            raise RefusedError(f"{name}: filters {filters}: allowed are {', '.join(_FILTERS.values())}, each once")
+        yield name, dataset
 
 
-def _name(raw: bytes) -> str:
-    name = raw.decode("utf-8", "replace")
-    if not _NAME.fullmatch(name) or _TAKEN_AWAY in name:
-        raise RefusedError(f"{attribute_check.shown(name)}: allowed in a name are letters, digits and underscores")
-    return name
-
-
-def _size_of(name: str, dataset: h5py.Dataset) -> int:
-    """Return how many bytes a variable is said to have; raises RefusedError unless it is numbers, and not too many."""
-    if not attribute_check.is_number(dataset.id.get_type()):
-        raise RefusedError(f"{name}: type {_type_of(dataset)}: allowed are {', '.join(attribute_check.NUMBERS)}")
-    if dataset.id.get_space().get_simple_extent_type() == h5py.h5s.NULL:
-        raise RefusedError(f"{name}: has no shape; our variables have one")
-    shape = dataset.shape
-    if len(shape) > MOST_DIMENSIONS:
-        raise RefusedError(f"{name}: has {len(shape)} dimensions: allowed are {MOST_DIMENSIONS}")
-    size = math.prod(shape) * dataset.dtype.itemsize
-    if size > MOST_BYTES or max(shape, default=0) > MOST_BYTES:
-        told = " × ".join(map(str, shape))
-        raise RefusedError(f"{name}: is {told} numbers ({_shown(size)}): allowed are {_shown(MOST_BYTES)}")
-    return size
-
-
-def _check_storage(name: str, item: _Item, size: int) -> None:
-    """Raise RefusedError unless a variable's values are in the file, all of them."""
-    dataset = item.dataset
-    plan = dataset.id.get_create_plist()
-    layout = plan.get_layout()
-    if plan.get_external_count() or layout == h5py.h5d.VIRTUAL:
-        raise RefusedError(f"{name}: keeps its data outside of this file")
-    filters = [plan.get_filter(k)[0] for k in range(plan.get_nfilters())]
-    if len(set(filters)) < len(filters) or not set(filters) <= set(_FILTERS):
-        raise RefusedError(f"{name}: filters {filters}: allowed are {', '.join(_FILTERS.values())}, each once")
-    if layout == h5py.h5d.CHUNKED:
-        _check_chunks(name, item)
-    elif layout == h5py.h5d.CONTIGUOUS:
-        _check_block(name, item, size)
-    else:
-        raise RefusedError(f"{name}: allowed are values in chunks or in one block")
-
-
-def _type_of(dataset: h5py.Dataset) -> str:
-    try:
-        return str(dataset.dtype)
-    except (TypeError, ValueError):
-        return "unknown"
-
-
-def _check_chunks(name: str, item: _Item) -> None:
-    dataset = item.dataset
-    piece = math.prod(dataset.chunks) * dataset.dtype.itemsize
-    if piece > LARGEST_PIECE:
-        raise RefusedError(f"{name}: chunks of {_shown(piece)}: allowed are {_shown(LARGEST_PIECE)}")
-    expected = math.prod(-(-size // chunk) for size, chunk in zip(dataset.shape, dataset.chunks, strict=True))
-    if expected > MOST_CHUNKS and not item.is_bare:
-        raise RefusedError(f"{name}: is in {expected} chunks: allowed are {MOST_CHUNKS}")
-    found = dataset.id.get_num_chunks() if dataset.id.get_space_status() != h5py.h5d.SPACE_STATUS_NOT_ALLOCATED else 0
-    if found != expected and not (item.is_bare and found == 0):
-        raise RefusedError(f"{name}: {found} of its {expected} chunks are there; its values are not whole")
-    places = set()
-    for chunk in _chunks(dataset) if found else ():
-        places.add(chunk.chunk_offset)
-        grid = zip(chunk.chunk_offset, dataset.shape, dataset.chunks, strict=True)
-        if any(offset >= size or offset % step for offset, size, step in grid):
-            raise RefusedError(f"{name}: a chunk at {chunk.chunk_offset}, where none of its values are")
-        if chunk.filter_mask:
-            raise RefusedError(f"{name}: a chunk without its filters; its checksum would not be checked")
-    if len(places) < found:
-        raise RefusedError(f"{name}: two chunks for the same values")
-
-
-def _chunks(dataset: h5py.Dataset) -> list[h5py.h5d.StoreInfo]:
-    chunks: list[h5py.h5d.StoreInfo] = []
-    dataset.id.chunk_iter(chunks.append)
-    return chunks
-
-
-def _check_block(name: str, item: _Item, size: int) -> None:
-    if size > LARGEST_PIECE:
-        raise RefusedError(f"{name}: {_shown(size)} in one block: allowed are {_shown(LARGEST_PIECE)}")
-    if size and not item.is_bare and item.dataset.id.get_offset() is None:
-        raise RefusedError(f"{name}: has no values; our variables have them")
+def _is_number(kind: h5py.h5t.TypeID) -> bool:
+    return not kind.committed() and any(kind.equal(known) for known in _TYPES)
 
 
 def _dimensions(file: h5py.File, items: Mapping[str, _Item]) -> dict[str, tuple[str, ...]]:
     """Return the names of the axes; raises RefusedError unless each is a dimension of the file, and as long."""
-    scales, names, numbers = {}, {}, set()
-    for name, item in items.items():
-        if not item.is_scale:
-            continue
-        number = item.about.get("_Netcdf4Dimid")
-        if item.dataset.ndim != 1 or not isinstance(number, np.integer) or number in numbers:
-            raise RefusedError(f"{name}: a dimension has one axis, and a number (_Netcdf4Dimid) of its own")
-        if np.atleast_1d(item.about.get("_Netcdf4Coordinates", number)).tolist() != [number]:
-            raise RefusedError(f"{name}: _Netcdf4Coordinates names another dimension than its own")
-        if "DIMENSION_LIST" in item.about:
-            raise RefusedError(f"{name}: a dimension that has dimensions (DIMENSION_LIST)")
-        numbers.add(number)
-        place = h5py.h5o.get_info(item.dataset.id).addr
-        scales[place], names[place] = item.dataset.shape[0], name
-    dimensions: dict[str, tuple[str, ...]] = {name: (name,) for name in names.values()}
+    scales = {h5py.h5o.get_info(item.dataset.id).addr: name for name, item in items.items() if item.is_scale}
+    dimensions: dict[str, tuple[str, ...]] = {}
     for name, item in items.items():
         if item.is_scale:
+            if item.dataset.ndim != 1:
+                raise RefusedError(f"{name}: a dimension has one axis")
+            dimensions[name] = (name,)
             continue
-        found = list(_scales_of(file, name, item))
-        if [scales.get(place) for place in found] != list(item.dataset.shape):
+        places = [
+            h5py.h5o.get_info(h5py.h5r.dereference(reference, file.id)).addr
+            for references in item.dataset.attrs.get("DIMENSION_LIST", ())
+            for reference in references
+        ]
+        found = [scales[place] for place in places if place in scales]
+        shape = [size for scale in found for size in items[scale].dataset.shape]
+        if len(places) != len(set(found)) or shape != list(item.dataset.shape):
             raise RefusedError(f"{name}: DIMENSION_LIST: allowed is a dimension of this file for each axis, as long")
-        if len(set(found)) < len(found):
-            raise RefusedError(f"{name}: DIMENSION_LIST names a dimension twice")
-        dimensions[name] = tuple(names[place] for place in found)
+        dimensions[name] = tuple(found)
     return dimensions
 
 
-def _scales_of(file: h5py.File, name: str, item: _Item) -> Iterator[int]:
-    """Yield where in the file the dimension of each axis is."""
-    for references in item.dataset.attrs["DIMENSION_LIST"] if "DIMENSION_LIST" in item.about else ():
-        if len(references) != 1 or not references[0]:
-            raise RefusedError(f"{name}: DIMENSION_LIST: allowed is one dimension for each axis")
-        yield h5py.h5o.get_info(h5py.h5r.dereference(references[0], file.id)).addr
+def _attributes(where: str, item: h5py.File | h5py.Dataset) -> dict[str, Any]:
+    """Return the attributes of a file or variable; raises RefusedError at one that is not plain text or numbers."""
+    about = {name: _value(where, item, name) for name in item.attrs if name not in _REFERENCES}
+    for name in _CHANGING:
+        if name in about:
+            raise RefusedError(f"{where}: attribute {name}: makes readers change the numbers; our files have none")
+    return about
 
 
-def _coordinates(file: h5py.File, variables: Mapping[str, _Item]) -> Iterator[str]:
-    """Yield the names of the variables that say where others are, as CF has it."""
-    yield from (name for name, item in variables.items() if item.is_scale)
-    for named in (
-        file.attrs.get("coordinates", ""),
-        *(item.about.get("coordinates", "") for item in variables.values()),
-    ):
-        yield from (word for word in str(named).split() if word in variables)
+def _value(where: str, item: h5py.File | h5py.Dataset, name: str | bytes) -> Any:
+    """Return an attribute's value, once its type is known."""
+    place = f"{where}: attribute {shown(name)}"
+    if not isinstance(name, str) or not name.isprintable():  # h5py gives bytes that are no text as they are
+        raise RefusedError(f"{place}: allowed is a name in plain text")
+    attribute = h5py.h5a.open(item.id, name.encode("utf-8"))
+    kind, is_null = attribute.get_type(), attribute.get_space().get_simple_extent_type() == h5py.h5s.NULL
+    is_text = kind.get_class() == h5py.h5t.STRING
+    if not is_text and not _is_number(kind):
+        raise RefusedError(f"{place}: allowed are plain text and plain numbers")
+    if is_null or len(attribute.shape) > (0 if is_text else 1):
+        raise RefusedError(f"{place}: allowed is one text, one number, or a list of numbers")
+    value = item.attrs[name]
+    if not is_text:
+        return value
+    try:
+        text = value.decode("utf-8") if isinstance(value, bytes) else str(value)
+        text.encode("utf-8")
+    except UnicodeError:
+        raise RefusedError(f"{place}: is not UTF-8 text") from None
+    if any(unicodedata.category(sign) == "Cc" and sign not in "\n\t" for sign in text):
+        raise RefusedError(f"{place}: has control characters in its text")
+    return text
 
 
-# What netCDF-4 keeps for itself, and which variables are coordinates, which is told apart.
-_ITS_OWN = frozenset(
-    (
-        *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "coordinates"),
-        *("_NCProperties", "_nc3_strict"),
-    )
-)
+def _public(about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the attributes that are not netCDF-4's own; a list of one number is a number."""
+    found = {key: value for key, value in about.items() if key not in _ITS_OWN}
+    return {key: value[0] if np.shape(value) == (1,) else value for key, value in found.items()}
 
 
-def _told(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is said of a file or variable to those that read it: a list of one value is a value."""
-    kept = {key: value for key, value in about.items() if key not in _ITS_OWN}
-    return {key: value[0] if np.shape(value) == (1,) else value for key, value in kept.items()}
+def _meanings(name: str, item: _Item) -> int:
+    """Return how many values an enum has, 0 of what is none.
+
+    Raises RefusedError unless a variable has a name and a unit, and an enum a word for each value.
+    """
+    about = item.about
+    for key in ("units", "long_name"):
+        if not isinstance(about.get(key), str) or not about[key].strip():
+            raise RefusedError(f"{name}: has no {key}; every variable of ours has")
+    if "flag_values" not in about and "flag_meanings" not in about:
+        return 0
+    values, words = np.atleast_1d(about.get("flag_values", ())), str(about.get("flag_meanings", "")).split()
+    in_order = values.tolist() == list(range(len(words)))
+    if item.dataset.dtype.kind != "i" or not words or len(set(words)) < len(words) or not in_order:
+        raise RefusedError(
+            f"{name}: an enum is whole numbers, with flag_values 0, 1, … and a word for each in flag_meanings"
+        )
+    return len(words)
 
 
-def _shown(size: int) -> str:
-    """Return a number of bytes for people."""
-    for unit in ("bytes", "kB", "MB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000  # type: ignore[assignment]
-    return f"{size:.3g} GB"
+def _check_scene(about: Mapping[str, Any]) -> None:
+    """Raise RefusedError unless the scene in a file is the one whose digest is beside it (`Scene.digest`)."""
+    if "scene" not in about:
+        return
+    try:
+        mapping = json.loads(str(about["scene"]))
+        text = json.dumps(mapping, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    except (ValueError, RecursionError):
+        raise RefusedError("the file: attribute scene: allowed is a scene as JSON") from None
+    if not isinstance(mapping, dict) or hashlib.sha256(text.encode()).hexdigest() != about.get("scene_digest"):
+        raise RefusedError("the file: attribute scene: is not the scene that scene_digest was made of")
+
+
+def shown(text: object) -> str:
+    """Return what a file says, `printable`, cut to a readable length."""
+    plain = printable(text)
+    return plain if len(plain) <= 60 else plain[:57] + "..."

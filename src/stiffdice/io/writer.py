@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -34,22 +34,22 @@ def temporary_of(target: Path) -> Path:
     containers of this one, cannot be asked.
     """
     here = host.name()
-    ours = re.compile(rf"\.{re.escape(target.name)}\.{re.escape(here)}\.([0-9]+)\.part")
-    with contextlib.suppress(OSError):  # a folder that cannot be read is told by who writes in it
-        for entry in os.scandir(target.parent):
-            found = ours.fullmatch(entry.name)
-            if found and not _is_alive(int(found[1])):
-                with contextlib.suppress(OSError):
-                    Path(entry).unlink()
+    _remove(target, rf"{re.escape(here)}\.([0-9]+)", lambda found: not _is_alive(int(found[1])))
     return target.with_name(f".{target.name}.{here}.{os.getpid()}.part")
 
 
 def clear(target: Path) -> None:
     """Remove all that is unfinished of a file, of whatever host: for one who knows that nobody else writes it."""
-    name = re.compile(rf"\.{re.escape(target.name)}\..+\.[0-9]+\.part")
-    with contextlib.suppress(OSError):
+    _remove(target, r".+\.[0-9]+", lambda _: True)
+
+
+def _remove(target: Path, writer: str, is_gone: Callable[[re.Match[str]], bool]) -> None:
+    """Remove what is unfinished of a file and names a writer of this pattern, HOST.PID, who is gone."""
+    name = re.compile(rf"\.{re.escape(target.name)}\.{writer}\.part")
+    with contextlib.suppress(OSError):  # a folder that cannot be read: whoever writes in it says so
         for entry in os.scandir(target.parent):
-            if name.fullmatch(entry.name):
+            found = name.fullmatch(entry.name)
+            if found and is_gone(found):
                 with contextlib.suppress(OSError):
                     Path(entry).unlink()
 
@@ -89,24 +89,16 @@ def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") ->
 
 
 def store(temporary: Path, target: Path) -> None:
-    """Give a finished file its name, once it is safely on disk; raises OutputError if it cannot."""
-    try:
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    except OSError as error:
-        raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
+    """Give a finished file its name, once it is safely on disk; raises OSError if it cannot."""
+    with temporary.open("rb") as file:
+        os.fsync(file.fileno())
+    temporary.replace(target)
     with contextlib.suppress(OSError):  # the file is there; some file systems cannot sync a folder
-        _sync_folder(target.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make a rename last through a power failure."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+        folder = os.open(target.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)  # so that the name lasts through a power failure
+        finally:
+            os.close(folder)
 
 
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:

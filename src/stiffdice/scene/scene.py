@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import hashlib
 import json
 import re
@@ -255,8 +254,7 @@ def _override(data: Any, text: str) -> Any:
         return result
     if keys[0] not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
         known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]
-        close = difflib.get_close_matches(path, known, n=1)
-        raise InputError(f"--set {text}: no such key{f'; did you mean {close[0]}?' if close else ''}")
+        raise InputError(f"--set {text}: no such key{validation.meant(path, known)}")
     section = dict(validation.known_keys(keys[0], _given(result.get(keys[0])), _KEYS[keys[0]]))
     if len(keys) == 3:
         spin = section.get(keys[1])

@@ -20,6 +20,7 @@ from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
+from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
@@ -69,7 +70,7 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, *co
         "history": f"made by stiffdice {__version__}",
         "source": f"simulation, model {model}, scheme {scheme}",
         "references": "Modeling and Simulating Dice (student paper, New York University)",
-        "format_version": schema.FORMAT_VERSION,
+        "format_version": FORMAT_VERSION,
         "stiffdice_version": __version__,
         "libraries": libraries(),
         "code_digest": code_digest(*code),

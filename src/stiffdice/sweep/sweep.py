@@ -16,7 +16,7 @@ from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import schema
-from stiffdice.io.content_digest import CELL, cell_digests, digest_of_cells
+from stiffdice.io.content_digest import CELL, cell_digests, runs_digest
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend, dataset
@@ -236,7 +236,7 @@ def collect(
     return _sorted(pattern, columns).assign_attrs(
         asked,
         title="Sweep of stiffness and steps",
-        runs_digest=digest_of_cells(digests),
+        runs_digest=runs_digest(digests),
         judging_code_digest=code_digest("stiffdice.sweep.sweep"),
     )
 
