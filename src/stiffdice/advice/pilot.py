@@ -85,7 +85,7 @@ class Pilot:
     """What a pilot run found; curves have the shape (SAMPLES + 1,), of a run that would end at each time.
 
     floor [1]: how far the path may be off, in radii; round_off [1]: as the twins of the same method tell it. other: the
-    run by another method, None if it took too long; other_method: what it is called, and why there is none. landings:
+    run by another method, None if it took too long; other_method: its name, or why there is none. landings:
     samples at which the ground began to push the cube up.
     """
 
@@ -184,7 +184,7 @@ def flown(scene: Scene, patience: int = PATIENCE) -> Pilot:
 
 
 def _by_another_method(scene: Scene, model: str, scheme: str, patience: int) -> tuple[Trial | None, str]:
-    """Return a run by another method than `scheme`, and what that is called; or none, and why."""
+    """Return a run by another method than `scheme`, and its name; or none, and why."""
     name, simulator, other = _OTHERS[scheme]
     most = patience if simulator == OURS else patience // _DEARER
     trial = tried(scene, model, other, SAMPLES, schemes.FINEST, most, simulator)

@@ -62,9 +62,9 @@ def advise(
     """Return how to compute a scene to an error.
 
     scene: the problem. error [radii]: root mean square distance between the cube's centre and its exact path, over
-    the time to the horizon, in radii of the cube. horizon [s]: until when the error is to be kept; None is the scene's
+    the time to the horizon, in radii of the cube. horizon [s]: until when the error is to hold; None is the scene's
     duration. scheme: advice for this one alone. patience: force evaluations of the longest pilot run. budget: steps
-    that a run of fixed steps may compute one by one. tell: called with what is tried next.
+    that a run of fixed steps may compute one by one. tell: called with the name of what is tried next.
 
     Raises InputError for an unknown name, a number out of range, and a scene of which no path can be computed.
     """

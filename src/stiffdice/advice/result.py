@@ -18,7 +18,7 @@ class Option:
     error [radii]: expected; None if nothing is known. basis: `measured`, `extrapolated` or `theory` (no run says
     anything; steps are those of the stability limit, and not enough). evaluations [1]: of the force. seconds [s]:
     about, of the time loop. omega_h [1]: of the fastest contact; None for a scheme that takes its own steps. limit [1]:
-    up to which omega_h the scheme is stable. keeps: whether the error asked is expected to be kept. evidence: a
+    up to which omega_h the scheme is stable. keeps: whether the requested error is expected to be met. evidence: a
     sentence.
     """
 

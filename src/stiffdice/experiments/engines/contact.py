@@ -34,7 +34,8 @@ RATIOS = {
     "friction": "horizontal over vertical impulse in that bounce, over mu",
 }
 
-# Periods of the contact that a cube at rest is looked at, and the ωh at which the exact contact is followed.
+# Periods of the contact over which the depth of a cube at rest is averaged, and the ωh at which the exact contact is
+# sampled.
 _PERIODS, _FINE = 10, 0.002
 
 

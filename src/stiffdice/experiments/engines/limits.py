@@ -1,7 +1,7 @@
 """How long a step of a method may be: one flat bounce, and a cube at rest, at one ωh after another.
 
-A bounce is made at several phases of the step at touch-down, and told by its restitution. A cube at rest is nudged, and
-told by how far it then gets from where it rests.
+Bounces at several phases of the step at touch-down are measured by their restitution. A cube at rest is nudged, and
+measured by its largest distance from its place of rest.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from stiffdice.simulation.engines import stepper
 # The paper's scheme, the one that is like what engines do to contacts, and the engines that are always there.
 METHODS = ("symplectic_euler", "implicit_euler", "scipy", "numpy")
 
-# Magic steps, and those half way between them, are looked at down to this number of steps in a contact.
+# Magic steps, and those half way between them, are in the scan down to this number of steps in a contact.
 _MAGIC = 8
 
 # Of a cube at rest: the nudge in units of the sag, and the steps for which it is followed.

@@ -1,4 +1,4 @@
-"""One flat bounce by any method: launched so that a step meets the ground at a chosen phase, and looked at after."""
+"""One flat bounce by any method, launched so that a step meets the ground at a chosen phase."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """How many steps a second: the same motion in steps of the same size, by every method of fixed step.
 
 What is timed is stepping alone, one run at a time: each engine has built its model of the scene before. A method that
-takes steps of its own is told by its force evaluations.
+takes steps of its own is measured by its force evaluations.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def time(
 ) -> xr.Dataset:
     """Return median times of runs [s] and what they took, dimensions problem, method; not-a-number where one is unfit.
 
-    scene: of which the problems of TIMED are made, at its own stiffness. methods: names of schemes and engines. steps:
+    scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
 
     Raises InputError for a number out of range, and an engine that is not installed.

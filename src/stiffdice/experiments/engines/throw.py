@@ -1,7 +1,7 @@
 """The paper's throw in every engine: how far each is from the reference over time, with the more steps the closer.
 
-A throw is chaotic: at each landing what two runs differ by grows. So it is told while it is small, and a method's own
-convergence beside it: what no shorter step makes less is not the step's, but the contact's.
+A throw is chaotic: at each landing the difference between two runs grows. So it is compared while it is small, and a
+method's own convergence beside it: what no shorter step makes less is not the step's, but the contact's.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
 
     methods: names of schemes and engines; one that cannot represent the scene is left out, and `unfit` says why.
     steps: of the simplest scheme at the most; of another so many less as its steps take longer (`stepper.DEARER`),
-    so that each is given about the same time. samples: equal parts of the duration, after each of which a state is
-    kept. `reference_error` is how far the reference is from the same at a thousand times its tolerance.
+    so that each is given about the same time. samples: equal parts of the duration; a state is stored after each.
+    `reference_error` is how far the reference is from the same at a thousand times its tolerance.
 
     Raises InputError for a number out of range, an engine that is not installed, and a scene that none can represent.
     """

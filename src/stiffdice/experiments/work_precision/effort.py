@@ -31,7 +31,7 @@ EXACT = frozenset({"exact"})
 # Schemes that control their own error; steps are the intervals after which a state is known.
 CONTROLLED = schemes.OWN_STEPS
 
-# Engines that take the steps they are told, one by one.
+# Engines of fixed step.
 STEPPING = [name for name, peer in ENGINES.items() if not peer.own_steps]
 
 # Stands for every scheme that can run a problem, and the outside solvers; engines are named one by one.
@@ -74,7 +74,7 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
 
 
 def fixed_step(method: str) -> bool:
-    """Return whether a method takes steps of the size it is told."""
+    """Return whether a method has a fixed step."""
     return not PEERS[method].own_steps if method in PEERS else method not in EXACT | CONTROLLED
 
 

@@ -31,7 +31,7 @@ MEASURES = {
 
 
 class Problem(NamedTuple):
-    """A kind of motion: the model that computes it, whether the ground rubs, and how it is called in a figure."""
+    """A kind of motion: the model that computes it, whether the ground rubs, and its name in a figure."""
 
     model: str
     rubs: bool

@@ -56,7 +56,7 @@ def time(
 
     problem, methods, stiffness, per_decade: as for the experiment `work-precision`. affordable [s]: longer runs are
     timed once. The ladder of a fixed step ends there, as above it `seconds_per_step` says, any other after three times
-    that. rounds: in each every run is timed; the median is told. `first_seconds` is a method's first call in a fresh
+    that. rounds: in each every run is timed; the median is stored. `first_seconds` is a method's first call in a fresh
     process, which loads compiled code, or compiles it if nobody has; everything else is warm.
 
     Raises InputError as the experiment does.
