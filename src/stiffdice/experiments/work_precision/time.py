@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.state import start_of
@@ -72,8 +71,7 @@ def time(
         climbed.append([_climbed(chosen, ground, name, per_decade, affordable) for name in names])
         times.append(interleaved([rung.run for rungs in climbed[-1] for rung in rungs], rounds, affordable))
     rows = [_numbers(rungs_of, taken) for rungs_of, taken in zip(climbed, times, strict=True)]
-    per_step = np.array([[rungs[-1]["seconds"] / rungs[-1]["steps"] for rungs in row] for row in rows])
-    per_step[:, [not fixed_step(name) for name in names]] = math.nan
+    per_step = [[_per_step(name, rungs) for name, rungs in zip(names, row, strict=True)] for row in rows]
     attributes = dataset.provenance_attributes(
         f"Time of work and precision: {chosen.name}", scene, chosen.model, "method", __name__
     )
@@ -88,6 +86,10 @@ def time(
         {"stiffness": of_cells("stiffness", grounds), "method": method_axis(names)},
         attributes | {"problem": problem, "samples": SAMPLES, "rounds": rounds} | stepper.attributes(names) | machine(),
     )
+
+
+def _per_step(method: str, rungs: Sequence[dict[str, float]]) -> float:
+    return rungs[-1]["seconds"] / rungs[-1]["steps"] if fixed_step(method) else math.nan
 
 
 def _numbers(climbed: Sequence[Sequence[Rung]], times: Times) -> list[list[dict[str, float]]]:
