@@ -9,9 +9,9 @@ from pathlib import Path
 
 from benchmarks import BENCHMARKS
 from benchmarks.run import bench
-from stiffdice.cli import output
+from stiffdice.cli.common import name_of
 from stiffdice.cli.main import called
-from stiffdice.cli.progress import Notes
+from stiffdice.cli.progress import notes
 from stiffdice.scene import validation
 
 EXAMPLES = """\
@@ -46,11 +46,11 @@ def _bench(options: argparse.Namespace) -> None:
     for name in options.names:
         validation.choice("NAME", name, BENCHMARKS)
 
-    folder = output.name_of("--folder", options.folder)
+    folder = name_of("--folder", options.folder)
 
     against = None if options.against is None else Path(options.against)
-    with Notes("bench:") as notes:
-        stored = bench(folder, names=options.names, quick=options.quick, against=against, tell=notes.show)
+    with notes("bench:") as tell:
+        stored = bench(folder, names=options.names, quick=options.quick, against=against, tell=tell)
     print(stored.page)
     print(f"{stored.path}: stored, with the same as .md and .csv")
 

@@ -1,4 +1,4 @@
-"""Other people's engines on the same throw, one step of 10⁻⁴ s after another, by the adapters of `stiffdice.simulation.engines`."""
+"""Other people's engines on the same throw, one step of 10⁻⁴ s after another, by `stiffdice.simulation.engines`."""
 
 from __future__ import annotations
 

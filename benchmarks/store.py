@@ -14,6 +14,7 @@ import xarray as xr
 from benchmarks.case import Case, Missing
 from benchmarks.scenes import scene_of
 from stiffdice.dynamics.state import Array
+from stiffdice.io import schema
 from stiffdice.simulation import dataset
 
 # What a bench that is not all of it adds to its file's name; such a file is not what others are compared with.
@@ -30,7 +31,7 @@ def dataset_of(
     """
     variables = {case.name: ("round", samples[k], _attributes(case)) for k, case in enumerate(cases)}
     rounds = np.arange(samples.shape[1], dtype=np.int32)
-    coordinates = {"round": ("round", rounds, {"long_name": "round, in which the cases take turns", "units": "1"})}
+    coordinates = {"round": ("round", rounds, schema.attributes_of("bench", "round"))}
     attributes = dataset.provenance_attributes(
         "Benchmark", scene_of("gated", 100_000), "case", "symplectic_euler", "stiffdice.simulation.run"
     )

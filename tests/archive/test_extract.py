@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from stiffdice.archive.extract import AT_ONCE, LIMITS, Limits, unzip
+from stiffdice.archive import extract
+from stiffdice.archive.extract import AT_ONCE, unzip
 from stiffdice.errors import InputError, OutputError, RefusedError
 
 CONTENT = {"config/a.yaml": b"question: why?\n" * 40, "results/tiny/b.h5": bytes(range(256)) * 9, "README.md": b""}
@@ -40,10 +41,10 @@ def untouched(folder):
     return {path.name for path in folder.iterdir()} <= {"a.zip"}
 
 
-def refused(path, words, limits=LIMITS):
+def refused(path, words):
     """The one line that refuses it, with nothing left behind."""
     with pytest.raises(RefusedError, match=words) as caught:
-        unzip(path, path.parent / "out", limits=limits)
+        unzip(path, path.parent / "out")
     assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
     assert untouched(path.parent)
 
@@ -205,14 +206,19 @@ def test_members_that_share_their_bytes_are_refused(tmp_path):
     refused(path, "aa: overlaps|bb: overlaps")
 
 
-def test_a_bomb_is_refused_before_anything_is_unpacked(tmp_path):
+def test_a_bomb_is_refused_before_anything_is_unpacked(tmp_path, monkeypatch):
     path = packed(tmp_path / "a.zip", {"zeros": bytes(2_000_000)})
     refused(path, "zeros: 2000000 bytes out of")
     packed(path)
-    refused(path, "more than 1000 bytes", Limits(size=1000))
-    refused(path, "more than 2 folders", Limits(folders=2))  # config, results, results/tiny
-    refused(path, "results/tiny/b.h5: 3 parts in a name; allowed are 2", Limits(depth=2))
-    refused(path, "3 members; allowed are 2", Limits(members=2))
+    for name, most, words in (
+        ("MOST_BYTES", 1000, "more than 1000 bytes"),
+        ("MOST_FOLDERS", 2, "more than 2 folders"),  # config, results, results/tiny
+        ("MOST_PARTS", 2, "results/tiny/b.h5: 3 parts in a name; allowed are 2"),
+        ("MOST_MEMBERS", 2, "3 members; allowed are 2"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(extract, name, most)
+            refused(path, words)
 
 
 def test_a_bomb_that_says_little_of_itself_is_stopped_at_what_it_says(tmp_path):

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from tests.archive import packing
 
-from stiffdice.archive import manifest
+from stiffdice.archive import crate, manifest, preview
 from stiffdice.archive.pack import pack
 from stiffdice.cli.main import main
 from stiffdice.errors import InputError, OutputError, RefusedError
@@ -121,16 +121,19 @@ def test_it_holds_plain_files_and_folders_with_nothing_of_this_machine(finished,
             assert info.date_time == (1980, 1, 1, 0, 0, 0)
             assert not info.filename.startswith("/")
             assert ".." not in info.filename.split("/")
-        assert archive.namelist() == sorted(archive.namelist())
+        folders = [name for name in archive.namelist() if name.endswith("/")]
+        files = [name for name in archive.namelist() if not name.endswith("/")]
+        assert archive.namelist() == [*sorted(folders), *sorted(files[:-3]), preview.NAME, crate.NAME, manifest.NAME]
     for data in contents(packed.path).values():
         assert str(finished[0]).encode() not in data
         assert str(packing.ROOT).encode() not in data
 
 
-def test_what_deflating_makes_no_shorter_is_stored(packed):
+def test_every_file_is_deflated(packed):
     with zipfile.ZipFile(packed.path) as archive:
-        assert all(info.compress_size <= info.file_size for info in archive.infolist())
-        assert archive.getinfo("requirements/requirements.lock").compress_type == zipfile.ZIP_DEFLATED
+        files = [info for info in archive.infolist() if not info.is_dir()]
+    assert {info.compress_type for info in files} == {zipfile.ZIP_DEFLATED}
+    assert all(info.compress_size <= 1.01 * info.file_size + 16 for info in files)
 
 
 def test_a_stale_result_is_told(own, tmp_path):
@@ -206,15 +209,16 @@ def test_a_name_that_other_systems_do_not_take_cannot_be_packed(own, tmp_path, n
 
 
 def test_a_file_that_changes_while_it_is_packed_ends_it(own, tmp_path, monkeypatch):
+    from stiffdice.archive import contents as module
+
     folder, planned = own
-    from stiffdice.archive import crate
 
-    def late(facts):
+    def late(files):
         (folder / "results/tiny/tables/answers.md").write_text("other")
-        return metadata(facts)
+        return read(files)
 
-    metadata = crate.metadata
-    monkeypatch.setattr(crate, "metadata", late)
+    read = module.read
+    monkeypatch.setattr(module, "read", late)
     with pytest.raises(InputError, match=r"answers\.md: was changed while it was packed"):
         pack(planned, folder, tmp_path / "a.zip")
     assert list(tmp_path.glob("*.zip")) == list(tmp_path.glob(".*.part")) == []
@@ -301,9 +305,12 @@ def test_out_of_the_project_the_command_says_so(tmp_path, monkeypatch, capsys):
 
 
 def test_an_archive_larger_than_zip_once_could_be_is_written(tmp_path, monkeypatch):
-    from stiffdice.archive import pack as module
+    from stiffdice.archive import contents as module
+    from stiffdice.archive import pack as packing_module
 
     monkeypatch.setattr(zipfile, "ZIP64_LIMIT", 10)  # as if a few bytes were two gigabytes
-    members = {name: module._measured(b"0123456789" * 5) for name in ("a", "b/c")}
-    module._write(tmp_path / "a.zip", members)
-    assert contents(tmp_path / "a.zip") == {"a": b"0123456789" * 5, "b/c": b"0123456789" * 5}
+    (tmp_path / "source").write_bytes(b"0123456789" * 5)
+    file = module.File("b/c", "data", tmp_path / "source")
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        packing_module._add(archive, file, manifest.digest_of(file.source))
+    assert contents(tmp_path / "a.zip") == {"b/c": b"0123456789" * 5}

@@ -133,9 +133,8 @@ def test_it_runs_other_code_away_from_everything(project, tmp_path, monkeypatch,
     with opened(packed(project, tmp_path / "a.zip")) as unpacked:
         assert unpacked.code.version == "0.0.7" and not unpacked.code.is_installed
         rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox))
-    assert rebuilt.ok and rebuilt.different == {}
-    assert rebuilt.same == ["results/tiny/runs.csv", "results/tiny/same.txt"]
-    assert rebuilt.left_out == ["results/tiny/figures/t.svg", "results/tiny/logs/job.log"]
+    assert rebuilt.ok and (rebuilt.found.files, rebuilt.found.identical) == (2, 2)
+    assert set(rebuilt.found.left_out) >= {"figures/t.svg", "logs/job.log"}
     assert any("the archive's lock says 0.0.1" in note for note in rebuilt.notes)
     assert "made again by the archive's own code, not the installed: 2 files are the same" in rebuilt.lines()[0]
     told = "\n".join(rebuilt.notes)
@@ -150,7 +149,8 @@ def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
     (project / "results/tiny/same.txt").write_text("same but for this")
     path, kept = packed(project, tmp_path / "a.zip"), tmp_path / "kept"
     assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 1
-    assert "DIFFERS: results/tiny/same.txt: 17 bytes archived, 4 now" in capsys.readouterr().out
+    assert "DIFFERS, between the archive (A) and what was made again (B):\n" in (out := capsys.readouterr().out)
+    assert "\nsame.txt\n  other bytes\n" in out
     assert (kept / REBUILT / "results/tiny/same.txt").read_text() == "same"
     assert (kept / ARCHIVED / "results/tiny/same.txt").read_text() == "same but for this"
     assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 2
@@ -161,10 +161,14 @@ def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("made", "reason"),
     [
-        ("pass", "was not made"),
+        ("pass", "only in A: same.txt"),
         (
             "p = os.path.abspath; os.symlink(p('.').replace('rebuilt', 'archived') + '/' + out, p(out))",
-            "there is a link",
+            "same.txt: a link, or no file",
+        ),
+        (
+            "os.rmdir('results/tiny'); os.symlink(os.path.abspath('../archived/results/tiny'), 'results/tiny')",
+            "only in A: same.txt",
         ),
     ],
 )
@@ -174,8 +178,8 @@ def test_what_was_not_made_is_not_the_same(project, tmp_path, made, reason):
     (project / "workflow/run.py").write_text(run)
     with opened(packed(project, tmp_path / "a.zip"), tmp_path / "kept") as unpacked:
         rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox=False))
-    assert not rebuilt.ok and rebuilt.same == []
-    assert reason in rebuilt.different["results/tiny/same.txt"][0]
+    assert not rebuilt.ok and rebuilt.found.identical == 0
+    assert any(reason in line for line in rebuilt.lines())
 
 
 def test_nothing_to_compare_is_not_the_same(project, tmp_path):
@@ -184,7 +188,7 @@ def test_nothing_to_compare_is_not_the_same(project, tmp_path):
     (project / "workflow/run.py").write_text("")
     with opened(packed(project, tmp_path / "a.zip")) as unpacked:
         rebuilt = rebuild(unpacked, way_of(unpacked, in_sandbox=False))
-    assert not rebuilt.ok and rebuilt.different == {} and "there was nothing to compare" in rebuilt.notes
+    assert not rebuilt.ok and rebuilt.found.same and "there was nothing to compare" in rebuilt.notes
 
 
 @pytest.mark.workflow
@@ -358,4 +362,5 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
     assert main(["rebuild", str(path), "-o", str(tmp_path / "kept")]) == 1
     out = capsys.readouterr().out
     assert f"made again by the installed code, stiffdice {__version__}: 3 files are the same to the last bit" in out
-    assert f"1 differ; 0 hold or show times and are not compared\nDIFFERS: {RUN}" in out
+    assert "1 differ; 0 hold or show times and are not compared\nDIFFERS, between" in out
+    assert "the numbers are the same; different: attributes in 1 file\ntitle: forged against " in out

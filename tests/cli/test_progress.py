@@ -17,9 +17,9 @@ def clock(monkeypatch):
 
 
 def told(clock, capsys, moments):
-    with progress.Progress() as shown:
+    with progress.progress() as show:
         for clock[0], fraction in moments:
-            shown.show(fraction)
+            show(fraction)
     return capsys.readouterr().err
 
 

@@ -13,6 +13,7 @@ from stiffdice.io import schema
 from stiffdice.io.reader import open_file
 from stiffdice.io.structure_check import FORMAT_VERSION
 
+STORED = Path(__file__).parents[1] / "reference" / "formats" / FORMAT_VERSION
 PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
 
 
@@ -39,10 +40,11 @@ def test_the_page_has_a_line_for_everything():
         assert rows == [*kind.attributes, *kind.variables]
 
 
+@pytest.mark.parametrize("stored", [True, False], ids=["stored", "written"])
 @pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier"])
-def test_names_in_files_are_those_of_the_schema(written, kind):
-    """Of an enum only the words are the writer's, of a measure the name is its criterion's."""
-    dataset = open_file(written[kind])
+def test_names_in_files_are_those_of_the_schema(written, kind, stored):
+    """Those of stored files do not change. The words of an enum are its writer's, a measure's name its criterion's."""
+    dataset = open_file(STORED / f"{kind}.h5" if stored else written[kind])
     for name, part in schema.KINDS[kind].variables.items():
         if name in dataset.variables and not part.long_name.startswith("measure of criterion"):
             assert dataset[name].attrs["long_name"] == part.long_name

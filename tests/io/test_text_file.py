@@ -66,7 +66,7 @@ def test_every_reader_of_text_ends(strange):
     assert told is None or not told.asked
     (strange.parent / "shards").mkdir()
     (strange.parent / "shards" / "0123456789ab.h5").touch()
-    assert folders.read(strange.parent).unlisted <= {"shards/0123456789ab.h5"}
+    assert folders.read("A", strange.parent).unlisted <= {"shards/0123456789ab.h5"}
 
 
 def test_verify_refuses_a_list_that_is_too_long(tmp_path):
@@ -82,9 +82,9 @@ def test_a_table_without_its_column_leaves_out_nothing(tmp_path):
     (tmp_path / "shards").mkdir()
     (tmp_path / "shards" / "0123456789ab.h5").touch()
     (tmp_path / "shards.csv").write_text("nonsense\n1\n")
-    assert not folders.read(tmp_path).unlisted
+    assert not folders.read("A", tmp_path).unlisted
     (tmp_path / "shards.csv").write_text("shard\nba9876543210\n")
-    assert folders.read(tmp_path).unlisted == {"shards/0123456789ab.h5"}
+    assert folders.read("A", tmp_path).unlisted == {"shards/0123456789ab.h5"}
 
 
 def test_a_table_with_a_field_that_is_too_long_is_none(tmp_path):

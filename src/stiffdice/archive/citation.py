@@ -41,17 +41,16 @@ class Citation(NamedTuple):
         for key in _NEEDED:
             if not isinstance(data, dict) or key not in data:
                 raise InputError(f"{path}: {key} is missing")
-        url = data.get("repository-code", data.get("url"))
         return cls(
-            str(data["title"]),
-            str(data["version"]),
-            str(data["date-released"]),
-            str(data["license"]),
-            url,
-            " ".join(str(data.get("abstract", "")).split()),
-            tuple(data.get("keywords", ())),
-            tuple(map(_author, data["authors"])),
-            tuple((work["title"], ", ".join(_author(who).name for who in work["authors"])) for work in _works(data)),
+            title=str(data["title"]),
+            version=str(data["version"]),
+            released=str(data["date-released"]),
+            licence=str(data["license"]),
+            url=data.get("repository-code", data.get("url")),
+            abstract=" ".join(str(data.get("abstract", "")).split()),
+            keywords=tuple(data.get("keywords", ())),
+            authors=tuple(map(_author, data["authors"])),
+            references=tuple((work["title"], _names(work)) for work in data.get("references", ())),
         )
 
     @property
@@ -61,13 +60,14 @@ class Citation(NamedTuple):
         return f"{authors} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
 
 
-def _works(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return list(data.get("references", ()))
+def _names(work: Mapping[str, Any]) -> str:
+    return ", ".join(_author(entry).name for entry in work["authors"])
 
 
 def _author(entry: Mapping[str, Any]) -> Author:
     if "name" in entry:
         return Author(entry["name"], False, entry.get("website"), None)
     parts = (entry.get(key) for key in ("given-names", "name-particle", "family-names", "name-suffix"))
-    name = " ".join(part for part in parts if part)
-    return Author(name, True, entry.get("orcid", entry.get("website")), entry.get("affiliation"))
+    return Author(
+        " ".join(filter(None, parts)), True, entry.get("orcid", entry.get("website")), entry.get("affiliation")
+    )

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from stiffdice.archive import manifest
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.reader import open_file
@@ -145,19 +146,15 @@ def _config(study: str, root: Path) -> Iterator[File]:
 
 
 def tree(root: Path, top: str, kind: str) -> Iterator[File]:
-    """Yield the files in a folder of the project and below it; raises InputError for a link among them."""
+    """Yield the files in a folder of the project and below it; raises InputError for what is none, a link perhaps."""
     if not (root / top).is_dir():
         raise InputError(f"{top}: not here; an archive is made in the project's folder")
-    for folder, folders, names in os.walk(root / top):
-        folders[:] = sorted(name for name in folders if not _is_left_out(name))
-        for name in sorted([*names, *(name for name in folders if (Path(folder) / name).is_symlink())]):
-            source = Path(folder) / name
-            path = source.relative_to(root).as_posix()
-            if _is_left_out(name):
-                continue
-            if source.is_symlink():
-                raise InputError(f"{path}: a link; an archive holds files only")
-            yield File(path, kind, source)
+    for name, source in manifest.files_in(root / top):
+        if any(map(_is_left_out, name.split("/"))):
+            continue
+        if not manifest.is_regular(source):
+            raise InputError(f"{top}/{name}: a link; an archive holds files only")
+        yield File(f"{top}/{name}", kind, source)
 
 
 def _is_left_out(name: str) -> bool:

@@ -18,7 +18,7 @@ from stiffdice import __version__
 from stiffdice.archive import manifest
 from stiffdice.archive.citation import Author, Citation
 from stiffdice.archive.contents import KINDS, File
-from stiffdice.archive.sizes import Sizes, sentence
+from stiffdice.archive.sizes import Sizes
 from stiffdice.errors import RefusedError
 from stiffdice.study.config import Study
 from stiffdice.study.eta import took
@@ -26,15 +26,20 @@ from stiffdice.study.outputs import Result
 
 NAME = "ro-crate-metadata.json"
 
+# What the crate conforms to, what its workflow does, and what each of its parameters does: names and versions.
 _PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
     "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
     "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
 }
-# Schema.org has had this property since its version 12, RO-Crate 1.1 goes by version 10.
-_TERMS = {"sha256": "http://schema.org/sha256"}
 _WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
 _PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
+_OF_PARTS = {
+    _WORKFLOW_PROFILE: ("Bioschemas ComputationalWorkflow", "1.0-RELEASE"),
+    _PARAMETER_PROFILE: ("Bioschemas FormalParameter", "1.0-RELEASE"),
+}
+# Schema.org has had this property since its version 12, RO-Crate 1.1 goes by version 10.
+_TERMS = {"sha256": "http://schema.org/sha256"}
 _NETCDF = "https://docs.unidata.ucar.edu/netcdf-c/current/file_format_specifications.html"
 
 _FORMATS = {
@@ -57,6 +62,8 @@ _FOLDERS = {
     "src/stiffdice": "The library: the simulator, its judgement, its figures",
     "workflow": "Rules, scripts and schema of the workflow",
 }
+# Files of the project that are described one by one, besides the study's and README.md, which is about the whole.
+_FILES = ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md")
 _HOMEPAGES = {
     "drake": "https://drake.mit.edu",
     "h5netcdf": "https://h5netcdf.org",
@@ -151,14 +158,8 @@ def metadata(facts: Facts) -> str:
     crate = ROCrate(version="1.1")
     _Crate(crate, facts).fill()
     graph = crate.metadata.generate()
-    entities = sorted((_compact(entity) for entity in graph["@graph"]), key=lambda entity: _rank(entity["@id"]))
+    entities = sorted((_compact(entity) for entity in graph["@graph"]), key=lambda entity: str(entity["@id"]))
     return json.dumps({**graph, "@graph": entities}, indent=1, sort_keys=True) + "\n"
-
-
-def _rank(identifier: str) -> tuple[int, str]:
-    """Return where an entity stands: what people look for comes first."""
-    first = (NAME, "./", "Snakefile", "#run")
-    return (first.index(identifier) if identifier in first else len(first), identifier)
 
 
 def _compact(entity: Mapping[str, Any]) -> dict[str, Any]:
@@ -177,19 +178,21 @@ class _Crate:
         """Add everything."""
         facts, root = self.facts, self.crate.root_dataset
         self.crate.metadata.extra_terms.update(_TERMS)
+        told = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
+        self._add("ro-crate-preview.html", "CreativeWork", **told)
         workflow = self._workflow()
-        self._preview()
         inputs = [self._file(path) for path in (f"config/{facts.study.name}.yaml", *facts.scenes)]
         outputs = self._results()
-        for path in ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md"):
+        for path in _FILES:
             self._file(path)
         self._file("README.md", about=root)
-        self._folders()
-        listing = {"name": manifest.NAME, "encodingFormat": "text/plain"}
-        told = "The SHA-256 of every file but itself: sha256sum --check"
-        self.crate.add_file(dest_path=manifest.NAME, properties={**listing, "description": told})
-        run = self._run(workflow, inputs, outputs)
-        self._describe(root, run)
+        for path, description in _FOLDERS.items():
+            self._folder(path, description)
+        self._add(_NETCDF, "WebSite", name="netCDF-4 on HDF5")
+        told = {"name": manifest.NAME, "encodingFormat": "text/plain"}
+        told["description"] = "The SHA-256 of every file but itself: sha256sum --check"
+        self.crate.add_file(dest_path=manifest.NAME, properties=told)
+        self._describe(root, self._run(workflow, inputs, outputs))
 
     def _add(self, identifier: str, kind: str, **properties: Any) -> Any:
         """Add an entity that is no file, and return it; properties without a value are left out."""
@@ -198,38 +201,54 @@ class _Crate:
         told = {key: value for key, value in properties.items() if value not in (None, [], "")}
         return self.crate.add(ContextEntity(self.crate, identifier, properties={"@type": kind, **told}))
 
+    def _file(self, path: str, **properties: Any) -> Any:
+        return self.crate.add_file(dest_path=quote(path), properties=self._said(path) | properties)
+
+    def _folder(self, path: str, description: str, **properties: Any) -> Any:
+        told = {"name": PurePosixPath(path).name, "description": description}
+        return self.crate.add_dataset(dest_path=f"{path}/", properties=told | properties)
+
+    def _said(self, path: str) -> dict[str, Any]:
+        """Return size, digest and format of a file."""
+        size, sha256 = self.facts.digests[path]
+        suffix = PurePosixPath(path).suffix
+        media = _FORMATS.get(suffix, "text/plain")
+        told: dict[str, Any] = {"name": PurePosixPath(path).name, "contentSize": str(size), "sha256": sha256}
+        return told | {"encodingFormat": [media, {"@id": _NETCDF}] if suffix == ".h5" else media}
+
+    def _profiles(self, profiles: Mapping[str, tuple[str, str]]) -> list[Any]:
+        return [
+            self._add(identifier, "CreativeWork", name=name, version=number)
+            for identifier, (name, number) in profiles.items()
+        ]
+
     def _describe(self, root: Any, run: Any) -> None:
-        facts = self.facts
-        licence = f"https://spdx.org/licenses/{facts.citation.licence}"
+        facts, cited = self.facts, self.facts.citation
+        licence = f"https://spdx.org/licenses/{cited.licence}"
+        about = (
+            f"{facts.study.question} A study of stiffdice {cited.version}: its data, figures, report, configuration, "
+            "workflow, code and locked versions. 'stiffdice verify' checks it, 'stiffdice rebuild' makes it again. "
+            f"{facts.sizes.sentence}"
+        ).strip()
         told = {
             "name": facts.title,
-            "description": " ".join(
-                [
-                    f"{facts.study.question} A study of stiffdice {facts.citation.version}: its data, figures, report, "
-                    "configuration, workflow, code and locked versions. 'stiffdice verify' checks it, 'stiffdice "
-                    f"rebuild' makes it again. {sentence(facts.sizes)}".strip(),
-                    *(f"{line}." for line in facts.study.left_out),
-                ]
-            ),
+            "description": " ".join([about, *(f"{line}." for line in facts.study.left_out)]),
             "datePublished": facts.published,
-            "version": facts.citation.version,
-            "keywords": ", ".join(facts.citation.keywords),
+            "version": cited.version,
+            "keywords": ", ".join(cited.keywords),
             "license": self._add(
                 licence,
                 "CreativeWork",
-                name=facts.citation.licence,
-                description=f"{facts.citation.licence} licence; its text is in the file LICENSE.",
+                name=cited.licence,
+                description=f"{cited.licence} licence; its text is in the file LICENSE.",
                 url=licence,
             ),
-            "author": [self._author(k, author) for k, author in enumerate(facts.citation.authors, 1)],
+            "author": [self._author(k, author) for k, author in enumerate(cited.authors, 1)],
             "citation": [
                 self._add(f"#reference-{k}", "CreativeWork", name=title, description=f"By {authors}")
-                for k, (title, authors) in enumerate(facts.citation.references, 1)
+                for k, (title, authors) in enumerate(cited.references, 1)
             ],
-            "conformsTo": [
-                self._add(identifier, "CreativeWork", name=name, version=number)
-                for identifier, (name, number) in _PROFILES.items()
-            ],
+            "conformsTo": self._profiles(_PROFILES),
             "mentions": [run],
             "size": self._sizes(),
         }
@@ -238,30 +257,23 @@ class _Crate:
                 root[key] = value
 
     def _author(self, number: int, author: Author) -> Any:
-        kind = "Person" if author.is_person else "Organization"
-        affiliation = author.affiliation and self._add(
-            f"#affiliation-{number}", "Organization", name=author.affiliation
-        )
-        return self._add(
-            author.url or f"#author-{number}", kind, name=author.name, url=author.url, affiliation=affiliation or None
-        )
+        kind, where = "Person" if author.is_person else "Organization", author.affiliation
+        employer = self._add(f"#affiliation-{number}", "Organization", name=where) if where else None
+        identifier = author.url or f"#author-{number}"
+        return self._add(identifier, kind, name=author.name, url=author.url, affiliation=employer)
 
     def _sizes(self) -> list[Any]:
         sizes = self.facts.sizes
-        kinds = [
-            self._add(f"#size-{kind}", "QuantitativeValue", name=KINDS[kind], value=size.bytes, unitText="bytes")
-            for kind, size in sizes.kinds.items()
+        amounts: list[tuple[str, str, float, str]] = [
+            (kind, KINDS[kind], size.bytes, "bytes") for kind, size in sizes.kinds.items()
         ]
-        each = round(sizes.per_run(), 1) if sizes.runs else None
-        runs = self._add("#size-runs", "QuantitativeValue", name="runs in shards", value=sizes.runs, unitText="runs")
-        run = self._add(
-            "#size-run", "QuantitativeValue", name="a run in the shards", value=each, unitText="bytes per run"
-        )
-        return [*kinds, runs, *([run] if sizes.runs else [])]
-
-    def _preview(self) -> None:
-        told = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
-        self._add("ro-crate-preview.html", "CreativeWork", **told)
+        amounts += [("runs", "runs in shards", sizes.runs, "runs")]
+        if sizes.per_run:
+            amounts += [("run", "a run in the shards", round(sizes.per_run[0], 1), "bytes per run")]
+        return [
+            self._add(f"#size-{key}", "QuantitativeValue", name=name, value=value, unitText=unit)
+            for key, name, value, unit in amounts
+        ]
 
     def _workflow(self) -> Any:
         study, where = self.facts.study.name, self.facts.citation.url or {"@id": "README.md"}
@@ -276,29 +288,25 @@ class _Crate:
         workflow = self.crate.add_workflow(
             dest_path="Snakefile", main=True, lang="snakemake", lang_version=number, properties=self._said("Snakefile")
         )
-        workflow["name"] = "stiffdice: how many time steps a stiff ground costs"
-        workflow["description"] = "From a study to runs, shards, sweeps, frontiers, figures and tables."
-        workflow["version"] = self.facts.citation.version
-        workflow["url"] = where
-        workflow["encodingFormat"] = "text/plain"
-        workflow["conformsTo"] = {"@id": _WORKFLOW_PROFILE}
-        workflow["input"] = [given]
-        workflow["output"] = [made]
-        workflow["softwareRequirements"] = self._software()
-        self._add(_WORKFLOW_PROFILE, "CreativeWork", name="Bioschemas ComputationalWorkflow", version="1.0-RELEASE")
-        self._add(_PARAMETER_PROFILE, "CreativeWork", name="Bioschemas FormalParameter", version="1.0-RELEASE")
+        told = {
+            "name": "stiffdice: how many time steps a stiff ground costs",
+            "description": "From a study to runs, shards, sweeps, frontiers, figures and tables.",
+            "version": self.facts.citation.version,
+            "url": where,
+            "encodingFormat": "text/plain",
+            "conformsTo": {"@id": _WORKFLOW_PROFILE},
+            "input": [given],
+            "output": [made],
+            "softwareRequirements": self._software(),
+        }
+        for key, about in told.items():
+            workflow[key] = about
+        self._profiles(_OF_PARTS)
         return workflow
 
     def _parameter(self, name: str, kind: str, description: str, example: Any) -> Any:
-        return self._add(
-            f"#{name}",
-            "FormalParameter",
-            name=name,
-            additionalType=kind,
-            description=description,
-            workExample=example,
-            conformsTo={"@id": _PARAMETER_PROFILE},
-        )
+        told = {"additionalType": kind, "description": description, "workExample": example}
+        return self._add(f"#{name}", "FormalParameter", name=name, conformsTo={"@id": _PARAMETER_PROFILE}, **told)
 
     def _software(self) -> list[Any]:
         """Add whatever made the numbers, in the versions that the files of results give."""
@@ -310,26 +318,6 @@ class _Crate:
             url = home or ({"@id": "README.md"} if ours else None)
             entities.append(self._add(identifier, "SoftwareApplication", name=name, softwareVersion=number, url=url))
         return entities
-
-    def _said(self, path: str) -> dict[str, Any]:
-        """Return size, digest and format of a file."""
-        size, sha256 = self.facts.digests[path]
-        suffix = PurePosixPath(path).suffix
-        media = _FORMATS.get(suffix, "text/plain")
-        told: dict[str, Any] = {"name": PurePosixPath(path).name, "contentSize": str(size), "sha256": sha256}
-        return told | {"encodingFormat": [media, {"@id": _NETCDF}] if suffix == ".h5" else media}
-
-    def _file(self, path: str, **properties: Any) -> Any:
-        return self.crate.add_file(dest_path=quote(path), properties=self._said(path) | properties)
-
-    def _folders(self) -> None:
-        for path, description in _FOLDERS.items():
-            self._folder(path, description)
-        self._add(_NETCDF, "WebSite", name="netCDF-4 on HDF5")
-
-    def _folder(self, path: str, description: str, **properties: Any) -> Any:
-        told = {"name": PurePosixPath(path).name, "description": description}
-        return self.crate.add_dataset(dest_path=f"{path}/", properties=told | properties)
 
     def _results(self) -> list[Any]:
         """Add everything below results/STUDY/, and return what the workflow made."""
@@ -347,10 +335,8 @@ class _Crate:
         for name, told in (("logs", f"What every job said; {differ}"), ("benchmarks", f"How long it took; {differ}")):
             if any(file.path.startswith(f"{top}/{name}/") for file in facts.files):
                 sides.append(self._folder(f"{top}/{name}", told, about={"@id": "#run"}))
-        whole = self._folder(
-            top, "All results of the study", exampleOfWork={"@id": "#results"}, hasPart=[*made, *sides]
-        )
-        return [whole, *made]
+        parts, asked = [*made, *sides], {"@id": "#results"}
+        return [self._folder(top, "All results of the study", exampleOfWork=asked, hasPart=parts), *made]
 
     def _run(self, workflow: Any, inputs: list[Any], outputs: list[Any]) -> Any:
         facts = self.facts

@@ -11,7 +11,6 @@ import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 from zipfile import ZipFile, ZipInfo
 
 from stiffdice.errors import InputError, OutputError, RefusedError
@@ -25,30 +24,20 @@ _HEADER = 30  # bytes of a member before its name
 _SMALL = 1_000_000  # bytes that a member may come to, whatever its ratio
 
 
-class Limits(NamedTuple):
-    """What an archive may hold at most: bytes unpacked, members, and bytes unpacked for one packed.
-
-    ratio: of members above a megabyte. Deflate cannot do more than 1032; what we pack reaches 30. folders: in all, also
-    those that are only in names; ours have some dozens. depth: parts of a name; ours have up to 6.
-    """
-
-    size: int = 20_000_000_000
-    members: int = 1_000_000
-    ratio: int = 200
-    folders: int = 10_000
-    depth: int = 20
-
-
-LIMITS = Limits()
+# What an archive may hold at most.
+MOST_BYTES = 20_000_000_000  # unpacked
+MOST_MEMBERS = 1_000_000
+MOST_RATIO = 200  # bytes for one packed, of members above a megabyte; deflate can do 1032, what we pack reaches 30
+MOST_FOLDERS = 10_000  # also those that are only in names; ours have some dozens
+MOST_PARTS = 20  # of a name; ours have up to 6
 
 
 def unzip(
     path: str | Path,
     folder: str | Path,
-    tell: Callable[[float], None] | None = None,
+    tell: Callable[[float], None] = lambda done: None,
     *,
     damaged: dict[str, str] | None = None,
-    limits: Limits = LIMITS,
 ) -> None:
     """Unpack a zip file that nobody vouches for into a new or empty folder, all of it or nothing.
 
@@ -65,14 +54,14 @@ def unzip(
         raise RefusedError(f"{path}: not a zip file, or a damaged one ({error})") from None
     with archive:
         try:
-            check(archive.infolist(), limits)
+            _check(archive.infolist())
         except RefusedError as error:
             raise error.within(str(path)) from None
         _check_target(target, sum(member.file_size for member in archive.infolist()))
         temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
         try:
             temporary.mkdir()
-            _unpack_all(archive, temporary, tell or (lambda done: None), damaged)
+            _unpack_all(archive, temporary, tell, damaged)
             temporary.replace(target)
         except OSError as error:
             raise OutputError(f"{target}: {error.strerror}; nothing was unpacked") from None
@@ -80,17 +69,16 @@ def unzip(
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-def check(members: Sequence[ZipInfo], limits: Limits = LIMITS) -> None:
+def _check(members: Sequence[ZipInfo]) -> None:
     """Raise RefusedError naming the first member that must not be unpacked, and why."""
-    if len(members) > limits.members:
-        raise RefusedError(f"{len(members)} members; allowed are {limits.members}")
+    if len(members) > MOST_MEMBERS:
+        raise RefusedError(f"{len(members)} members; allowed are {MOST_MEMBERS}")
     for member in members:
-        reason = _wrong(member, limits)
-        if reason:
+        if reason := _wrong(member):
             raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
-    if sum(member.file_size for member in members) > limits.size:
-        raise RefusedError(f"more than {limits.size} bytes unpacked; this is no archive of a study")
-    _check_doubles(members, limits)
+    if sum(member.file_size for member in members) > MOST_BYTES:
+        raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
+    _check_doubles(members)
     _check_overlaps(members)
 
 
@@ -98,7 +86,7 @@ def _is_folder(member: ZipInfo) -> bool:
     return member.filename.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
 
 
-def _wrong(member: ZipInfo, limits: Limits) -> str | None:
+def _wrong(member: ZipInfo) -> str | None:
     """Return why a member must not be unpacked: its name leads elsewhere, here or on another system, or what it is."""
     name, method, size, packed = member.orig_filename, member.compress_type, member.file_size, member.compress_size
     parts = name.removesuffix("/").split("/")
@@ -111,18 +99,18 @@ def _wrong(member: ZipInfo, limits: Limits) -> str | None:
         "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
         "a path with an empty part": "" in parts,
         "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
-        f"{len(parts)} parts in a name; allowed are {limits.depth}": len(parts) > limits.depth,
+        f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
         "has a second name": member.filename != name,  # some versions of zipfile take it instead
         "is a link or a special file; allowed are files and folders": kind
         not in {0, stat.S_IFDIR if _is_folder(member) else stat.S_IFREG},
         "is encrypted": member.flag_bits & _ENCRYPTED,
         f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
-        f"{size} bytes out of {packed}; allowed are {limits.ratio} for one": size > max(_SMALL, limits.ratio * packed),
+        f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
 
 
-def _check_doubles(members: Sequence[ZipInfo], limits: Limits) -> None:
+def _check_doubles(members: Sequence[ZipInfo]) -> None:
     """Raise RefusedError if two names are one file somewhere: in any case, in any form of Unicode, or as a folder."""
     folders: set[str] = set()
     files: set[str] = set()
@@ -135,8 +123,8 @@ def _check_doubles(members: Sequence[ZipInfo], limits: Limits) -> None:
             if path not in folders:
                 folders.add(path)
                 _take(path, spelt)
-        if len(folders) > limits.folders:
-            raise RefusedError(f"more than {limits.folders} folders; this is no archive of a study")
+        if len(folders) > MOST_FOLDERS:
+            raise RefusedError(f"more than {MOST_FOLDERS} folders; this is no archive of a study")
         if not _is_folder(member):
             if member.filename in files:
                 raise RefusedError(f"{member.filename}: is there twice")

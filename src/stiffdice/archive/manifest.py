@@ -3,16 +3,38 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from stiffdice.errors import RefusedError
+from stiffdice.errors import InputError, RefusedError
 
 # At the top of every archive; the only file that it does not list.
 NAME = "manifest-sha256.txt"
 
 _LINE = re.compile(r"([0-9a-f]{64})  ([^\n\r]+)")
+
+
+def files_in(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Yield what is in a folder and below it, but folders: its path there (with /), and where it lies.
+
+    Links are not followed, also to folders. Raises InputError if a folder cannot be read.
+    """
+
+    def refuse(error: OSError) -> None:
+        raise InputError(f"{error.filename}: {error.strerror}")
+
+    for top, folders, names in os.walk(folder, onerror=refuse):
+        folders.sort()
+        for name in sorted([*names, *(name for name in folders if Path(top, name).is_symlink())]):
+            path = Path(top, name)
+            yield path.relative_to(folder).as_posix(), path
+
+
+def is_regular(path: Path) -> bool:
+    """Return whether a path is a file, not a link to one, and nothing that reading might wait for."""
+    return path.is_file() and not path.is_symlink()
 
 
 def digest_of(path: Path) -> str:

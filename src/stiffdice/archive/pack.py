@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import stat
-import zipfile
-import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
 from stiffdice.archive import contents, crate, manifest, preview
 from stiffdice.archive.citation import Citation
-from stiffdice.archive.sizes import Size, Sizes, sum_of
+from stiffdice.archive.sizes import Size, Sizes
 from stiffdice.errors import InputError
 from stiffdice.io.writer import check_target, whole
 from stiffdice.study.config import Study
@@ -23,20 +22,6 @@ SUFFIX = ".crate.zip"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip file can say
 _UNIX = 3
 _AT_ONCE = 1 << 20  # bytes read at a time
-
-
-class Member(NamedTuple):
-    """A file as it is packed: bytes unpacked and packed, whether deflated, the digest of what it holds.
-
-    source: where it lies, or what it holds.
-    """
-
-    source: Path | bytes
-    size: int
-    packed: int
-    deflated: bool
-    sha256: str
-    program: bool = False
 
 
 class Packed(NamedTuple):
@@ -61,72 +46,30 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
     """
     path = check_target(target)
     files = contents.of(study, root)
+    digests = {file.path: manifest.digest_of(file.source) for file in files}
     found = contents.read(files)
-    members = {file.path: _measured(file.source) for file in files}
-    sizes = _sizes(files, members, found.runs)
-    facts = crate.Facts(
-        study,
-        Citation.load(root / "CITATION.cff"),
-        files,
-        contents.scenes_of(study.name, root),
-        {name: (member.size, member.sha256) for name, member in members.items()},
-        sizes,
-        found.software,
-        crate.span_of(files),
-        agent,
-    )
-    for name, text in ((preview.NAME, preview.page(facts)), (crate.NAME, crate.metadata(facts))):
-        members[name] = _measured(text.encode())
-    listing = manifest.text_of({name: member.sha256 for name, member in members.items()})
-    members[manifest.NAME] = _measured(listing.encode())
-    _write(path, members)
-    return Packed(path, path.stat().st_size, sizes)
-
-
-def _sizes(files: list[contents.File], members: Mapping[str, Member], runs: Mapping[str, int]) -> Sizes:
-    def size_of(path: str) -> Size:
-        return Size(1, members[path].size, members[path].packed)
-
-    kinds = {kind: sum_of(size_of(file.path) for file in files if file.kind == kind) for kind in contents.KINDS}
-    return Sizes(
-        {kind: size for kind, size in kinds.items() if size.files},
-        sum(runs.values()),
-        sum_of(size_of(path) for path in runs),
-    )
-
-
-def _measured(source: Path | bytes) -> Member:
-    """Return what there is to say of a file before it is packed; it is deflated if that makes it shorter."""
-    digest, stream = hashlib.sha256(), zlib.compressobj(wbits=-zlib.MAX_WBITS)
-    size = packed = 0
-    for block in _blocks(source):
-        digest.update(block)
-        size += len(block)
-        packed += len(stream.compress(block))
-    packed += len(stream.flush())
-    program = isinstance(source, Path) and bool(source.stat().st_mode & stat.S_IXUSR)
-    return Member(source, size, min(size, packed), packed < size, digest.hexdigest(), program)
-
-
-def _blocks(source: Path | bytes) -> Iterator[bytes]:
-    if isinstance(source, bytes):
-        yield source
-        return
-    try:
-        with source.open("rb") as file:
-            while block := file.read(_AT_ONCE):
-                yield block
-    except OSError as error:
-        raise InputError(f"{source}: {error.strerror}") from None
-
-
-def _write(target: Path, members: Mapping[str, Member]) -> None:
-    with whole(target) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-        for name in sorted([*members, *_folders(members)]):
-            if name.endswith("/"):
-                archive.writestr(_info(name, stat.S_IFDIR | 0o755), b"")
-            else:
-                _add(archive, name, members[name])
+    with whole(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
+        for folder in sorted(_folders(digests)):
+            archive.writestr(_info(folder, stat.S_IFDIR | 0o755, ZIP_STORED), b"")
+        for file in files:
+            _add(archive, file, digests[file.path])
+        facts = crate.Facts(
+            study,
+            Citation.load(root / "CITATION.cff"),
+            files,
+            contents.scenes_of(study.name, root),
+            {name: (archive.getinfo(name).file_size, digest) for name, digest in digests.items()},
+            _sizes(archive, files, found.runs),
+            found.software,
+            crate.span_of(files),
+            agent,
+        )
+        # What describes the others comes last.
+        for name, text in ((preview.NAME, preview.page(facts)), (crate.NAME, crate.metadata(facts))):
+            digests[name] = hashlib.sha256(text.encode()).hexdigest()
+            archive.writestr(_info(name), text)
+        archive.writestr(_info(manifest.NAME), manifest.text_of(digests))
+    return Packed(path, path.stat().st_size, facts.sizes)
 
 
 def _folders(names: Iterable[str]) -> set[str]:
@@ -134,22 +77,32 @@ def _folders(names: Iterable[str]) -> set[str]:
     return {f"{folder}/" for name in names for folder in map(str, PurePosixPath(name).parents) if folder != "."}
 
 
-def _info(name: str, mode: int) -> zipfile.ZipInfo:
-    info = zipfile.ZipInfo(name, _EPOCH)
+def _info(name: str, mode: int = stat.S_IFREG | 0o644, method: int = ZIP_DEFLATED) -> ZipInfo:
+    info = ZipInfo(name, _EPOCH)
     info.create_system = _UNIX
     info.external_attr = mode << 16
+    info.compress_type = method
     return info
 
 
-def _add(archive: zipfile.ZipFile, name: str, member: Member) -> None:
-    """Add a file; raises InputError if it is no longer what was measured, OSError if there is no room."""
-    info = _info(name, stat.S_IFREG | (0o755 if member.program else 0o644))
-    info.compress_type = zipfile.ZIP_DEFLATED if member.deflated else zipfile.ZIP_STORED
-    info.file_size = member.size  # so that zipfile takes 64 bits where they are needed
+def _add(archive: ZipFile, file: contents.File, sha256: str) -> None:
+    """Add a file; raises InputError if it is no longer of this digest, OSError if there is no room."""
+    about = file.source.stat()
+    info = _info(file.path, stat.S_IFREG | (0o755 if about.st_mode & stat.S_IXUSR else 0o644))
+    info.file_size = about.st_size  # so that zipfile takes 64 bits where they are needed
     digest = hashlib.sha256()
-    with archive.open(info, "w") as file:
-        for block in _blocks(member.source):
+    with file.source.open("rb") as source, archive.open(info, "w") as member:
+        while block := source.read(_AT_ONCE):
             digest.update(block)
-            file.write(block)
-    if digest.hexdigest() != member.sha256:
-        raise InputError(f"{name}: was changed while it was packed; wait until its study is done")
+            member.write(block)
+    if digest.hexdigest() != sha256:
+        raise InputError(f"{file.path}: was changed while it was packed; wait until its study is done")
+
+
+def _sizes(archive: ZipFile, files: Sequence[contents.File], runs: Mapping[str, int]) -> Sizes:
+    def size_of(paths: Iterable[str]) -> Size:
+        return Size.of(map(archive.getinfo, paths))
+
+    kinds = {kind: size_of(file.path for file in files if file.kind == kind) for kind in contents.KINDS}
+    there = {kind: size for kind, size in kinds.items() if size.files}
+    return Sizes(there, size_of(file.path for file in files), sum(runs.values()), size_of(runs))

@@ -13,31 +13,27 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
 
 from stiffdice import __version__
 from stiffdice.archive import installed, manifest, sandbox
-from stiffdice.archive.compare.compare import compare
+from stiffdice.archive.compare.compare import Comparison, compare
 from stiffdice.archive.extract import unzip
 from stiffdice.archive.installed import Code
 from stiffdice.archive.sandbox import Way
 from stiffdice.archive.verify import verify
-from stiffdice.errors import InputError, OutputError, RefusedError, StiffdiceError, printable
-from stiffdice.io import yaml_loader
+from stiffdice.errors import OutputError, RefusedError, StiffdiceError, printable
 from stiffdice.io.text_file import LARGEST_TABLE, text_of
-from stiffdice.study import catalogue
 from stiffdice.study import config as studies
 
 LAST_LINES = 20  # of a run that failed, to show
 
 # In the folder of a rebuild: the archive, out of a sandbox's sight; what runs and what it makes; what the run says.
 ARCHIVED, REBUILT, LOG = "archived", "rebuilt", "rebuild.log"
-
-# Under results/STUDY/: what no two runs share.
-_SIDE = ("logs/", "benchmarks/", "report.html")
+_NOTHING = "nothing"  # an empty folder, for results that are not in their place
 
 # What the installed code is given of an archive: files that Python cannot import.
 _READ = (".yaml", ".yml", ".json")
@@ -77,34 +73,35 @@ class Opened(NamedTuple):
 class Rebuilt:
     """What came of it.
 
-    folder: where it lies, if it was kept. by: what code made it again. same: files that are equal byte by byte. equal:
-    files of equal numbers in other bytes. different: by file, what differs. left_out: files that no two runs share:
-    logs, times, and what shows times. notes: what may explain a difference, and what equality does not say.
+    folder: where it lies, if it was kept. by: what code made it again. found: how the archive's results (A) and those
+    that were made (B) differ; logs, times, and what shows times are left out. notes: what may explain a difference, and
+    what equality does not say.
     """
 
     archive: str
     study: str
     by: str
-    folder: str | None = None
-    same: list[str] = field(default_factory=list)
-    equal: list[str] = field(default_factory=list)
-    different: dict[str, list[str]] = field(default_factory=dict)
-    left_out: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    folder: str | None
+    found: Comparison
+    notes: list[str]
 
     @property
     def ok(self) -> bool:
         """Whether something was compared, and nothing differs."""
-        return bool(self.same or self.equal) and not self.different
+        return self.found.files > 0 and self.found.same
 
     def lines(self) -> list[str]:
-        """Return it for people: how much is the same, a line for all that differs, and what may explain it."""
+        """Return it for people: how much is the same, all that differs, and what may explain it."""
+        found = self.found
         lines = [
-            f"{self.archive}: the study {self.study}, made again by {self.by}: {len(self.same)} files are the same to "
-            f"the last bit, {len(self.different)} differ; {len(self.left_out)} hold or show times and are not compared"
+            f"{self.archive}: the study {self.study}, made again by {self.by}: {found.identical} files are the same to "
+            f"the last bit, {len(found.differences) + len(found.only_a)} differ; {len(found.left_out)} hold or show "
+            "times and are not compared"
         ]
-        lines += [f"the same numbers in other bytes: {name}" for name in self.equal]
-        lines += [f"DIFFERS: {name}: {reason}" for name, reasons in self.different.items() for reason in reasons]
+        if not found.same:
+            lines += ["DIFFERS, between the archive (A) and what was made again (B):", *found.lines(), ""]
+        elif found.identical < found.files:
+            lines.append(found.verdict)
         lines += [f"note: {note}" for note in self.notes]
         if self.folder is not None:
             lines.append(f"it lies in {self.folder}: the archive in {ARCHIVED}, what was made again in {REBUILT}")
@@ -156,22 +153,19 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1, tell: Tell = lambda text
     """
     ours = unpacked.code.is_installed
     by = f"the installed code, stiffdice {__version__}" if ours else "the archive's own code, not the installed"
-    rebuilt = Rebuilt(unpacked.archive, unpacked.study, by, str(unpacked.folder) if unpacked.kept else None)
-    rebuilt.notes += other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
+    notes = other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
     _fill(unpacked)
-    results = {
-        name: digest for name, digest in unpacked.listed.items() if name.startswith(f"results/{unpacked.study}/")
-    }
-    said = _run(unpacked, way, cores, list(results), tell)
-    rebuilt.notes += [line for line in said if "left out:" in line]
-    _compare(rebuilt, unpacked.folder, results)
-    if not rebuilt.same and not rebuilt.equal and not rebuilt.different:
-        rebuilt.notes.append("there was nothing to compare")
+    said = _run(unpacked, way, cores, tell)
+    notes += [line for line in said if "left out:" in line]
+    found = _compared(unpacked)
+    if found.files == 0 and found.same:
+        notes.append("there was nothing to compare")
     if not ours:
-        rebuilt.notes.append(f"{unpacked.code}; equal files say that its own code gives them, not what this computes")
+        notes.append(f"{unpacked.code}; equal files say that its own code gives them, not what this computes")
     if not ours and way.could:
-        rebuilt.notes.append(f"it ran {way}, and could have copied the archive's results")
-    return rebuilt
+        notes.append(f"it ran {way}, and could have copied the archive's results")
+    folder = str(unpacked.folder) if unpacked.kept else None
+    return Rebuilt(unpacked.archive, unpacked.study, by, folder, found, notes)
 
 
 @contextmanager
@@ -251,8 +245,9 @@ def _fill(unpacked: Opened) -> None:
             shutil.copy(unpacked.folder / ARCHIVED / name, target)
 
 
-def _run(unpacked: Opened, way: Way, cores: int, expected: list[str], tell: Tell) -> list[str]:
+def _run(unpacked: Opened, way: Way, cores: int, tell: Tell) -> list[str]:
     """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
+    expected = [name for name in unpacked.listed if name.startswith(f"results/{unpacked.study}/")]
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
     command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
     folder, log = unpacked.folder / REBUILT, unpacked.folder / LOG
@@ -283,35 +278,11 @@ def _last_of(log: Path) -> str:
         return file.read().decode("utf-8", "replace")
 
 
-def _compare(rebuilt: Rebuilt, folder: Path, results: Mapping[str, str]) -> None:
-    """Compare what was made with what was archived, file by file."""
-    top, made = f"results/{rebuilt.study}/", (folder / REBUILT).resolve()
-    timed = catalogue.showing_times(yaml_loader.load(folder / ARCHIVED / "config" / f"{rebuilt.study}.yaml"))
-    times = tuple(top + name for name in (*_SIDE, *(f"{name}." for name in timed)))
-    for name, digest in results.items():
-        new = made / name
-        if name.startswith(times):
-            rebuilt.left_out.append(name)
-        elif not new.is_file():
-            rebuilt.different[name] = ["was not made"]
-        elif new.resolve() != new:  # to the archive's own, perhaps
-            rebuilt.different[name] = ["was not made: there is a link"]
-        elif manifest.digest_of(new) == digest:
-            rebuilt.same.append(name)
-        else:
-            lines = _told_apart(folder / ARCHIVED / name, new)
-            if lines:
-                rebuilt.different[name] = lines
-            else:
-                rebuilt.equal.append(name)
-
-
-def _told_apart(old: Path, new: Path) -> list[str]:
-    """Return what differs between two files that are not equal byte by byte; nothing if it is no number."""
-    if old.suffix != ".h5":
-        return [f"{old.stat().st_size} bytes archived, {new.stat().st_size} now; not the same"]
-    try:
-        comparison = compare(old, new)
-    except InputError as error:
-        return [str(error)]
-    return [] if comparison.same else list(comparison.lines())
+def _compared(unpacked: Opened) -> Comparison:
+    """Return how the archive's results (A) and those made again (B) differ; what is only in B was not asked for."""
+    archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
+    if made.resolve() != made:  # a link, to the archive's own perhaps
+        made = unpacked.folder / _NOTHING
+    made.mkdir(parents=True, exist_ok=True)
+    found = compare(archived, made)
+    return replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))

@@ -10,12 +10,13 @@ from __future__ import annotations
 import itertools
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, NamedTuple
+
+import psutil
 
 from stiffdice.errors import RefusedError
 
@@ -146,11 +147,10 @@ def end(running: subprocess.Popen[bytes]) -> None:
 
     Its first child is the first process of the namespace, whose end the kernel reports when all others in it are gone.
     """
-    with suppress(OSError):
-        for child in Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text(encoding="ascii").split():
-            os.kill(int(child), signal.SIGKILL)
-        with suppress(subprocess.TimeoutExpired):
-            running.wait(_PATIENCE)
+    with suppress(psutil.NoSuchProcess, subprocess.TimeoutExpired):
+        for child in psutil.Process(running.pid).children():
+            child.kill()
+        running.wait(_PATIENCE)
     running.kill()
     running.wait()
 

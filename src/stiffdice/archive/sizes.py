@@ -4,80 +4,67 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
+from zipfile import ZipInfo
 
 from stiffdice.archive.contents import KINDS
 
-# A study of so many runs is what sizes are stated for.
-MANY = 1_000_000
+MANY = 1_000_000  # runs of a study that sizes are stated for
 
 
 class Size(NamedTuple):
     """So many files; bytes of them unpacked, and packed."""
 
-    files: int = 0
-    bytes: int = 0
-    packed: int = 0
+    files: int
+    bytes: int
+    packed: int
 
-    def __add__(self, other: object) -> Size:
-        assert isinstance(other, Size)
-        return Size(self.files + other.files, self.bytes + other.bytes, self.packed + other.packed)
+    @classmethod
+    def of(cls, members: Iterable[ZipInfo]) -> Size:
+        """Return the size of members of a zip file together."""
+        each = [(member.file_size, member.compress_size) for member in members]
+        return cls(len(each), sum(size for size, _ in each), sum(packed for _, packed in each))
 
 
 class Sizes(NamedTuple):
     """What an archive holds, without the three files that describe it.
 
-    kinds: by the name of the kind, those there are. runs: how many runs of sweeps; shards: the files that hold them.
+    kinds: by the name of the kind, those there are. total: of all kinds. runs: how many runs of sweeps; shards: the
+    files that hold them.
     """
 
     kinds: Mapping[str, Size]
+    total: Size
     runs: int
     shards: Size
 
     @property
-    def total(self) -> Size:
-        """All kinds together."""
-        return sum_of(self.kinds.values())
+    def per_run(self) -> tuple[float, float] | None:
+        """Bytes of shards for one run, unpacked and packed; None if there are no runs."""
+        return (self.shards.bytes / self.runs, self.shards.packed / self.runs) if self.runs else None
 
-    def per_run(self, packed: bool = False) -> float:
-        """Return how many bytes of shards there are for one run; NaN if there are no runs."""
-        return (self.shards.packed if packed else self.shards.bytes) / self.runs if self.runs else float("nan")
+    @property
+    def rows(self) -> list[tuple[str, Size]]:
+        """The lines of a table: every kind by its name for people, then all of them."""
+        return [*((KINDS[kind], size) for kind, size in self.kinds.items()), ("all", self.total)]
 
+    @property
+    def sentence(self) -> str:
+        """What a run takes, and what a million would; empty if the study has no sweep."""
+        if self.per_run is None:
+            return ""
+        each, packed = self.per_run
+        return (
+            f"{self.runs:,} runs in {self.shards.files} shards: {each:.1f} bytes a run, {packed:.1f} packed; "
+            f"a million such runs: {in_megabytes(each * MANY)}, {in_megabytes(packed * MANY)} packed"
+        )
 
-def sum_of(sizes: Iterable[Size]) -> Size:
-    """Return sizes together."""
-    total = Size()
-    for size in sizes:
-        total += size
-    return total
-
-
-def rows(sizes: Sizes) -> list[tuple[str, Size]]:
-    """Return the lines of a table: every kind by its name for people, then all of them."""
-    kinds = [(KINDS[kind], sizes.kinds[kind]) for kind in KINDS if kind in sizes.kinds]
-    return [*kinds, ("all", sizes.total)]
-
-
-def sentence(sizes: Sizes) -> str:
-    """Return what a run takes, and what a million would; empty if the study has no sweep."""
-    if not sizes.runs:
-        return ""
-    bytes_each, packed_each = sizes.per_run(), sizes.per_run(packed=True)
-    return (
-        f"{sizes.runs:,} runs in {sizes.shards.files} shards: {bytes_each:.1f} bytes a run, {packed_each:.1f} packed; "
-        f"a million such runs: {in_megabytes(bytes_each * MANY)}, {in_megabytes(packed_each * MANY)} packed"
-    )
+    def __str__(self) -> str:
+        lines = [f"{'':22}{'files':>6}{'unpacked':>12}{'packed':>12}"]
+        for name, size in self.rows:
+            lines.append(f"{name:22}{size.files:6}{in_megabytes(size.bytes):>12}{in_megabytes(size.packed):>12}")
+        return "\n".join([*lines, self.sentence]).rstrip("\n")
 
 
 def in_megabytes(size: float) -> str:
     """Return a number of bytes for people."""
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
-
-
-def text_of(sizes: Sizes) -> str:
-    """Return the sizes as lines of text."""
-    lines = [f"{'':22}{'files':>6}{'unpacked':>12}{'packed':>12}"]
-    lines += [
-        f"{name:22}{size.files:6}{in_megabytes(size.bytes):>12}{in_megabytes(size.packed):>12}"
-        for name, size in rows(sizes)
-    ]
-    return "\n".join([*lines, *([sentence(sizes)] if sizes.runs else [])])

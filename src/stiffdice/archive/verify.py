@@ -3,62 +3,59 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import stat
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import unquote
 
+import h5py
 import xarray as xr
 
 from stiffdice.archive import manifest
+from stiffdice.archive.compare import folders
 from stiffdice.archive.consistency import check as sanity
 from stiffdice.archive.consistency import sweeps, words
+from stiffdice.archive.crate import NAME as CRATE
 from stiffdice.archive.extract import unzip
 from stiffdice.archive.verify_report import Report
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation, schema
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.reader import open_file, parts
-from stiffdice.io.text_file import rows_of, text_of
+from stiffdice.io.text_file import text_of
 from stiffdice.study import config as studies
 from stiffdice.study import job_log, output_digest, provenance
 from stiffdice.sweep import sweep
 
-CRATE = "ro-crate-metadata.json"
-
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
 _SCHEMA = Path("workflow/schemas/study.schema.yaml")
 _SHARD = re.compile("[0-9a-f]{12}")
 # Of a job, under the folder of its study's results.
 _LOG = re.compile("((?:.*/)?)logs/.+[.]log")
+# Files of these formats need not hold all that the checks look at.
+_BEFORE_SANITY = ("1.0", "1.1")
 
 Tell = Callable[[float], None]
 
 
-def verify(path: str | Path, tell: Tell | None = None) -> Report:
+def verify(path: str | Path, tell: Tell = lambda done: None) -> Report:
     """Return what was checked of an archive (zip or unpacked), a folder of results or an HDF5 file, and what fails.
 
     Checked are digests, both ways, where there is a manifest; the crate's description; and of every HDF5 file its seal
-    and checksums, its structure, its schema and whether its numbers can be (`sanity`), of a sweep also whether its
+    and checksums, its structure, its schema and whether its numbers can be (`consistency`), of a sweep also whether its
     shards add up to it and its frontier follows from it. tell: called with the fraction done. A zip file is unpacked
     into a temporary folder. Raises InputError if there is nothing to check, or a zip file that must not be unpacked.
     """
     place = Path(path)
-    tell = tell or (lambda done: None)
     if place.is_dir():
         return _Folder(place, str(path), tell).checked()
     if not place.is_file():
         raise InputError(f"{path}: {'not a file or folder' if place.exists() else 'No such file or folder'}")
-    if _begins_with(place, _HDF5):
+    if h5py.is_hdf5(path):
         report = Report(str(path), "file")
-        files = _Files(report, lambda name: None)
-        files.try_apart({place.name: place})
-        files.check(place.name, place)
+        _Files(report, {place.name: place}, {}, tell).check_all()
         return report
     damaged: dict[str, str] = {}
     with tempfile.TemporaryDirectory(prefix="stiffdice-verify-") as temporary:
@@ -67,14 +64,6 @@ def verify(path: str | Path, tell: Tell | None = None) -> Report:
         if not (folder / manifest.NAME).is_file() and manifest.NAME not in damaged:
             raise RefusedError(f"{path}: has no {manifest.NAME}; not an archive of stiffdice")
         return _Folder(folder, str(path), lambda done: tell((1 + done) / 2), "archive", damaged).checked()
-
-
-def _begins_with(path: Path, start: bytes) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(len(start)) == start
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
 
 
 class _Folder:
@@ -87,7 +76,15 @@ class _Folder:
         self._damaged = dict(damaged or {})
         self._is_archive = kind == "archive" or (folder / manifest.NAME).is_file()
         self.report = Report(path, kind or ("unpacked archive" if self._is_archive else "folder of results"))
-        self._files = self._walked()
+        self._files = dict(self._regular())
+
+    def _regular(self) -> Iterator[tuple[str, Path]]:
+        """Yield the files by their paths with /; links, and what is neither file nor folder, fail."""
+        for name, path in manifest.files_in(self._folder):
+            if not manifest.is_regular(path):
+                self.report.fail(name, "a link or a special file; allowed are files and folders")
+            elif self._is_archive or not _is_left_behind(path.name):
+                yield name, path
 
     def checked(self) -> Report:
         """Check all of it; raises InputError if there is nothing to check."""
@@ -99,72 +96,29 @@ class _Folder:
             report.fail(name, reason)
         if self._is_archive:
             report.count("files", len(self._files))
-            tell = self._teller(self._files, 0, 0.5)
-            digests = {}
-            for name, path in self._files.items():
-                digests[name] = manifest.digest_of(path)
-                tell(name)
+            digests = {name: manifest.digest_of(path) for name, path in self._files.items()}
             self._check_manifest(digests)
             self._check_crate(digests)
             self._check_made()
         else:
             report.note(f"digests (there is no {manifest.NAME})")
             self._check_asked()
-        files, done = _Files(report, self._teller(data, 0.5 if self._is_archive else 0, 1)), set()
-        files.try_apart(data)
-        for folder in sorted(
-            {str(PurePosixPath(name).parent) for name in data if PurePosixPath(name).name == "sweep.h5"}
-        ):
-            done |= files.check_sweep(folder, self._files)
-        for name, path in data.items():
-            if name not in done:
-                files.check(name, path)
+        _Files(report, data, self._files, self._tell).check_all()
         return report
-
-    def _teller(self, files: Mapping[str, Path], start: float, end: float) -> Callable[[str], None]:
-        """Return what is to be called with every file that is done, to tell how far it is by their sizes."""
-        sizes = {name: path.stat().st_size for name, path in files.items()}
-        done, total = 0, max(1, sum(sizes.values()))
-
-        def tell(name: str) -> None:
-            nonlocal done
-            done += sizes.get(name, 0)
-            self._tell(start + (end - start) * done / total)
-
-        return tell
-
-    def _walked(self) -> dict[str, Path]:
-        """Return the files by their paths with /; links, and what is neither file nor folder, fail."""
-        found: dict[str, Path] = {}
-        for top, folders, names in os.walk(self._folder):
-            folders.sort()
-            for name in sorted([*folders, *names]):
-                path = Path(top) / name
-                relative = path.relative_to(self._folder).as_posix()
-                mode = path.lstat().st_mode
-                if stat.S_ISREG(mode):
-                    if self._is_archive or not _is_left_behind(name):
-                        found[relative] = path
-                elif not stat.S_ISDIR(mode):
-                    self.report.fail(relative, "a link or a special file; allowed are files and folders")
-        return found
 
     def _text(self, name: str) -> str:
         """Return the text of a file; raises RefusedError, not naming it."""
-        path = self._files[name]
         try:
-            return text_of(path, _LARGEST_TEXT)
+            return text_of(self._files[name], _LARGEST_TEXT)
         except InputError as error:
-            raise RefusedError(str(error).removeprefix(f"{path}: ")) from None
+            raise RefusedError(_reason(error, self._files[name])) from None
 
     def _check_asked(self) -> None:
         """Check a study's results against what it asks now, in the project's folder."""
         name = self._folder.resolve().name
-        if not _SCHEMA.is_file() or self._folder.resolve() != Path("results", name).resolve():
-            self.report.note("whether a study asks for these results, as this is not its project's folder")
-            self._check_made()
-            return
         try:
+            if not _SCHEMA.is_file() or self._folder.resolve() != Path("results", name).resolve():
+                raise InputError("this is not its project's folder")
             stale = provenance.stale(provenance.of(studies.load(f"config/{name}.yaml", _SCHEMA)), self._folder)
         except InputError as error:
             self.report.note(f"whether a study asks for these results ({error})")
@@ -191,7 +145,7 @@ class _Folder:
         try:
             listed = manifest.parse(self._text(manifest.NAME)) if manifest.NAME in self._files else {}
         except RefusedError as error:
-            report.fail(manifest.NAME, str(error).removeprefix(f"{manifest.NAME}: "))
+            report.fail(manifest.NAME, _reason(error, manifest.NAME))
             return
         report.count("digests", len(listed))
         for name, digest in listed.items():
@@ -201,9 +155,8 @@ class _Folder:
                 report.fail(name, f"missing, but listed in {manifest.NAME}")
             elif digests[name] != digest:
                 report.fail(name, f"changed: its SHA-256 is {digests[name]}, listed is {digest}")
-        for name in digests:
-            if name not in listed and name != manifest.NAME:
-                report.fail(name, f"there, but not listed in {manifest.NAME}")
+        for name in sorted(digests.keys() - listed.keys() - {manifest.NAME}):
+            report.fail(name, f"there, but not listed in {manifest.NAME}")
 
     def _check_crate(self, digests: Mapping[str, str]) -> None:
         """Check that the crate's description can be read, and that what it says of files is so."""
@@ -213,8 +166,7 @@ class _Folder:
             self.report.fail(CRATE, "missing; an archive is an RO-Crate")
             return
         try:
-            graph = json.loads(self._text(CRATE))["@graph"]
-            entities = {str(entity["@id"]): entity for entity in graph}
+            entities = {str(entity["@id"]): entity for entity in json.loads(self._text(CRATE))["@graph"]}
         except RefusedError as error:
             self.report.fail(CRATE, str(error))
             return
@@ -250,81 +202,91 @@ def _is_left_behind(name: str) -> bool:
 
 
 class _Files:
-    """Checks HDF5 files, and what one says of another."""
+    """Checks HDF5 files, and what one says of another.
 
-    def __init__(self, report: Report, tell: Callable[[str], None]) -> None:
-        self._report, self._tell = report, tell
+    data: the HDF5 files, by their names; files: all of the folder. Another process has tried the data before: a file
+    that crashes it, or takes it too long, is not opened here.
+    """
+
+    def __init__(self, report: Report, data: Mapping[str, Path], files: Mapping[str, Path], tell: Tell) -> None:
+        self._report, self._data, self._files, self._tell = report, data, files, tell
         self._unread: set[str] = set()
-        self._refused: dict[str, InputError] = {}
+        self._refused = isolation.refused(data.values())
+        self._read, self._size = 0, sum(path.stat().st_size for path in data.values())
 
-    def try_apart(self, files: Mapping[str, Path]) -> None:
-        """Let another process read the files first: one that crashes it, or takes it too long, is not opened here."""
-        self._refused = isolation.refused(files.values())
+    def check_all(self) -> None:
+        """Check each file, and each sweep with its shards and its frontier, one against the other."""
+        done: set[str] = set()
+        for name in sorted(name for name in self._data if PurePosixPath(name).name == "sweep.h5"):
+            done |= self._check_sweep(PurePosixPath(name).parent)
+        for name in self._data:
+            if name not in done:
+                self._check(name)
 
-    def check(self, name: str, path: Path) -> None:
+    def _check(self, name: str) -> None:
         """Check one file by itself."""
         kind = "shard"
-        if PurePosixPath(name).parent.name == kind + "s":
-            for _ in self._shard(name, path):
+        if PurePosixPath(name).parent.name == folders.SHARDS:
+            for _ in self._shard(name):
                 pass
         else:
-            dataset = self._opened(name, path)
+            dataset = self._opened(name)
             kind = "" if dataset is None else sanity.kind_of(dataset)
         if kind in sanity.NOT_SEEN:
             self._report.note(sanity.NOT_SEEN[kind])
 
-    def check_sweep(self, folder: str, files: Mapping[str, Path]) -> set[str]:
-        """Check a sweep with its shards and its frontier, one against the other; return what was checked."""
-        whole, edges, table = (str(PurePosixPath(folder, name)) for name in ("sweep.h5", "frontier.h5", "shards.csv"))
-        there = [name for name in files if PurePosixPath(name).parent == PurePosixPath(folder, "shards")]
-        names = self._listed(table, folder, files) if table in files else there
-        collected = self._opened(whole, files[whole])
-        if collected is not None and names and all(name in files for name in names):
-            self._collect_again(whole, collected, {name: files[name] for name in names})
+    def _check_sweep(self, folder: PurePosixPath) -> set[str]:
+        """Check a sweep with its shards and its frontier; return what was checked."""
+        whole, edges = str(folder / "sweep.h5"), str(folder / "frontier.h5")
+        names = self._shards_of(folder)
+        collected = self._opened(whole)
+        if collected is not None and names and all(name in self._data for name in names):
+            self._collect_again(whole, collected, names)
         else:
             names = []
             self._report.note(sanity.NOT_SEEN["sweep"])
-        frontier = self._opened(edges, files[edges]) if edges in files else None
+        frontier = self._opened(edges) if edges in self._data else None
         if collected is not None and frontier is not None:
             self._compare(edges, lambda: sweeps.same_as_found(frontier, collected))
         return {whole, edges, *names}
 
-    def _listed(self, table: str, folder: str, files: Mapping[str, Path]) -> list[str]:
+    def _shards_of(self, folder: PurePosixPath) -> list[str]:
         """Return the shards that a sweep was collected from; those that are not there fail."""
+        table = str(folder / folders.LISTED)
+        if table not in self._files:
+            return folders.shards_of(self._data).get(str(folder / folders.SHARDS), [])
         try:
-            shards = [row["shard"] for row in rows_of(files[table])]
-        except (InputError, KeyError) as error:
-            self._report.fail(table, f"not a table of shards ({type(error).__name__})")
+            shards = folders.listed_in(self._files[table])
+        except InputError as error:
+            self._report.fail(table, _reason(error, self._files[table]))
             return []
-        names = [
-            str(PurePosixPath(folder, "shards", f"{shard}.h5")) for shard in shards if _SHARD.fullmatch(shard or "")
-        ]
-        if len(names) != len(shards):
+        if not all(_SHARD.fullmatch(shard or "") for shard in shards):
             self._report.fail(table, "names a shard that is none; allowed are 12 hexadecimal digits")
+            return []
+        names = [str(folder / folders.SHARDS / f"{shard}.h5") for shard in shards]
         for name in names:
-            if name not in files:
+            if name not in self._files:
                 self._report.fail(name, f"missing, but listed in {table}")
         return names
 
-    def _collect_again(self, whole: str, collected: xr.Dataset, shards: Mapping[str, Path]) -> None:
+    def _collect_again(self, whole: str, collected: xr.Dataset, names: Sequence[str]) -> None:
         """Check the shards of a sweep, and that they add up to it."""
-
-        left = dict(shards)
+        left = list(names)
 
         def each() -> Iterator[xr.Dataset]:
             while left:
-                yield from self._shard(*left.popitem())
+                yield from self._shard(left.pop())
 
         try:
-            names = meanings_of(collected["criterion"])
-            tolerances = dict(zip(names, map(float, collected["tolerance"].values), strict=True))
+            criteria = meanings_of(collected["criterion"])
+            tolerances = dict(zip(criteria, map(float, collected["tolerance"].values), strict=True))
             again = sweep.collect(each(), tolerances)
         except Exception as error:  # whatever hostile shards make of it
             for _ in each():  # those that it did not come to
                 pass
-            self._report.fail(whole, f"its shards do not add up to a sweep ({_told(error)})")
+            self._report.fail(whole, f"its shards do not add up to a sweep ({_reason(error)})")
             return
-        if self._unread.isdisjoint(shards):
+        if self._unread.isdisjoint(names):
             self._compare(whole, lambda: sweeps.same_as_collected(collected, again))
         else:
             self._report.note(f"whether the shards of {whole} add up to it (not all can be read)")
@@ -333,47 +295,40 @@ class _Files:
         try:
             self._report.fail(name, *compared())
         except Exception as error:  # whatever hostile files make of it
-            self._report.fail(name, f"cannot be computed again ({_told(error)})")
+            self._report.fail(name, f"cannot be computed again ({_reason(error)})")
 
-    def _opened(self, name: str, path: Path) -> xr.Dataset | None:
+    def _opened(self, name: str) -> xr.Dataset | None:
         """Return a file's dataset, checked; none if it cannot be read."""
-        self._report.count("hdf5_files")
-        try:
-            self._admit(path)
-            dataset = open_file(path)
-        except Exception as error:  # whatever a hostile file makes of its readers
-            self._report.fail(name, _told(error).removeprefix(f"{path}: "))
-            return None
-        if sanity.kind_of(dataset) == "run":
-            self._report.count("runs")
-        self._check_dataset(name, dataset)
-        self._tell(name)
-        return dataset
+        for dataset in list(self._admitted(name, lambda path: iter([open_file(path)]))):
+            if sanity.kind_of(dataset) == "run":
+                self._report.count("runs")
+            self._check_dataset(name, dataset)
+            return dataset
+        return None
 
-    def _shard(self, name: str, path: Path) -> Iterator[xr.Dataset]:
+    def _shard(self, name: str) -> Iterator[xr.Dataset]:
         """Yield the parts of a shard, checked, as far as it can be read."""
-        self._report.count("hdf5_files")
-        reading, first = parts(path), 0
-        while True:
-            try:
-                self._admit(path)
-                part = next(reading)
-            except StopIteration:
-                self._tell(name)
-                return
-            except Exception as error:  # whatever a hostile file makes of its readers
-                self._report.fail(name, _told(error).removeprefix(f"{path}: "))
-                self._unread.add(name)
-                return
+        first = 0
+        for part in self._admitted(name, parts):
             cells = part.sizes["cell"]
             self._report.count("runs", cells * part.sizes.get("member", 1))
             self._check_dataset(name, part, f"cells {first} to {first + cells - 1}, counted from {first}: ")
             yield part
             first += cells
 
-    def _admit(self, path: Path) -> None:
-        if str(path) in self._refused:
-            raise self._refused[str(path)]
+    def _admitted(self, name: str, read: Callable[[Path], Iterator[xr.Dataset]]) -> Iterator[xr.Dataset]:
+        """Yield what is read of a file; if it cannot be read to its end, the file fails."""
+        path = self._data[name]
+        self._report.count("hdf5_files")
+        try:
+            if str(path) in self._refused:
+                raise self._refused[str(path)]
+            yield from read(path)
+        except Exception as error:  # whatever a hostile file makes of its readers
+            self._report.fail(name, _reason(error, path))
+            self._unread.add(name)
+        self._read += path.stat().st_size
+        self._tell(self._read / max(1, self._size))
 
     def _check_dataset(self, name: str, dataset: xr.Dataset, where: str = "") -> None:
         problems = schema.problems(dataset) + words.problems(dataset)
@@ -385,11 +340,8 @@ class _Files:
         self._report.fail(name, *(where + problem for problem in problems))
 
 
-# Files of these formats need not hold all that the checks look at.
-_BEFORE_SANITY = ("1.0", "1.1")
-
-
-def _told(error: Exception) -> str:
+def _reason(error: Exception, source: str | Path = "") -> str:
+    """Return what is wrong in one line, not naming the file that it is wrong with."""
     if isinstance(error, InputError):
-        return str(error)
+        return str(error).removeprefix(f"{source}: ")
     return f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from stiffdice.cli import output
-from stiffdice.cli.options import add_changes, number
+from stiffdice.cli import common
 from stiffdice.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -50,14 +48,14 @@ _VECTORS = ("position", "velocity", "spin")
 _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    advise = commands.add_parser(
+    advise = common.add_command(
+        commands,
         "advise",
-        help="say how to run a scene to an error you choose: model, scheme, steps, time",
-        description="Say how to run a scene to an error: model, scheme, steps or tolerance, what they cost, and why.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        _advise,
+        "say how to run a scene to an error you choose: model, scheme, steps, time",
+        EXAMPLES,
     )
     advise.add_argument(
         "scene", metavar="SCENE.yaml", nargs="?", help="the physical problem; without it, the options below"
@@ -73,15 +71,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="do it, and check the promise against a run of twice the cost and another method",
     )
     advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
-    advise.add_argument("--json", action="store_true", help="the same for programs")
-    output.add_force(advise)
-    add_changes(advise)
+    common.add_json(advise)
+    common.add_force(advise)
+    common.add_changes(advise)
     scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
     either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
     for name, (_, text) in _KEYS.items():
         metavar = "X,Y,Z" if name in _VECTORS else "LAW" if name == "contact" else "X"
         either.get(name, scene).add_argument(f"--{name.replace('_', '-')}", metavar=metavar, help=text)
-    advise.set_defaults(call=_advise)
 
 
 def _given(options: argparse.Namespace) -> list[str]:
@@ -92,14 +89,6 @@ def _given(options: argparse.Namespace) -> list[str]:
         if text is not None:
             given.append(f"{key}=[{text}]" if name in _VECTORS else f"{key}={text}")
     return given + options.overrides
-
-
-def _named(options: argparse.Namespace, changes: Sequence[str]) -> list[str]:
-    """Return the arguments of `run` that name the scene of `advise`; none without a file, which `run` needs."""
-    if options.scene is None:
-        return []
-    preset = [] if options.preset is None else ["--preset", options.preset]
-    return [options.scene, *preset, *(word for change in changes for word in ("--set", change))]
 
 
 def _in_radii(text: str, scene: Scene) -> str:
@@ -122,30 +111,30 @@ def _advise(options: argparse.Namespace) -> int:
         scene = scenes.changed({}, changes, options.preset)
     else:
         scene = scenes.load(options.scene, changes, options.preset)
-    horizon = None if options.horizon is None else number("--horizon", options.horizon, "s")
+    horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
     if options.output is not None and not options.run:
         raise InputError("-o: a file is written with --run only")
     target = None
     if options.output is not None:
-        target = output.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
+        target = common.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
     from stiffdice.advice import report as advice_text
     from stiffdice.advice.check import check as checked
     from stiffdice.advice.check import run_advised
-    from stiffdice.cli.progress import Notes, Progress
+    from stiffdice.cli.progress import notes, progress
     from stiffdice.simulation.outcome import Verdict
 
     error = recommend.parsed_error(_in_radii(options.error, scene))
-    with Notes("advise: trying") as notes:
-        given = recommend.advise(scene, error, horizon=horizon, scheme=options.scheme, tell=notes.show)
+    with notes("advise: trying") as tell:
+        given = recommend.advise(scene, error, horizon=horizon, scheme=options.scheme, tell=tell)
     check = None
     if options.run and given.best is not None:
-        with Progress() as progress:
-            run = run_advised(given, given.best, progress.show)
-        with Progress() as progress:
-            check = checked(given, run, progress.show)
+        with progress() as show:
+            run = run_advised(given, given.best, show)
+        with progress() as show:
+            check = checked(given, run, show)
         if target is not None:
             from stiffdice.io.writer import write_dataset
             from stiffdice.simulation.dataset import run_dataset
@@ -156,7 +145,7 @@ def _advise(options: argparse.Namespace) -> int:
     else:
         for line in scene.derived:
             print(line)
-        print(advice_text.as_text(given, _named(options, changes)))
+        print(advice_text.as_text(given, common.scene_words(options, changes) if options.scene else []))
         if check is not None:
             print("\n" + advice_text.check_as_text(check))
             if target is not None:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiffdice.cli import output
+from stiffdice.cli import common
 
 if TYPE_CHECKING:
     from stiffdice.archive.sizes import Sizes
@@ -17,27 +17,24 @@ examples:
   stiffdice archive quick
   stiffdice archive quick -o quick.crate.zip --agent "Ada Lovelace"
   make archive STUDY=quick          # all of it
+
+The file is an RO-Crate: data, figures, report, configuration, workflow, code and locked versions, with a digest of
+each. To be called in the project's folder.
 """
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    archive = commands.add_parser(
-        "archive",
-        help="pack a finished study with all that made it into one file",
-        description="Pack a finished study into one zip file, an RO-Crate: data, figures, report, configuration,\n"
-        "workflow, code and locked versions, with a digest of each. Run it in the project's folder.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    archive = common.add_command(
+        commands, "archive", _archive, "pack a finished study with all that made it into one file", EXAMPLES
     )
     archive.add_argument("study", metavar="STUDY", help="the name of a file in config/, without .yaml")
     archive.add_argument(
         "-o", dest="output", metavar="FILE.zip", help="default: results/archives/STUDY-VERSION.crate.zip"
     )
-    output.add_force(archive)
+    common.add_force(archive)
     archive.add_argument("--agent", metavar="NAME", help="who ran the study, if the archive is to say so")
     archive.add_argument("--json", action="store_true", help="sizes for programs")
-    archive.set_defaults(call=_archive)
 
 
 def _archive(options: argparse.Namespace) -> None:
@@ -45,7 +42,7 @@ def _archive(options: argparse.Namespace) -> None:
 
     from stiffdice import __version__
     from stiffdice.archive import pack
-    from stiffdice.archive.sizes import in_megabytes, text_of
+    from stiffdice.archive.sizes import in_megabytes
     from stiffdice.errors import InputError, printable
     from stiffdice.study import config as studies
 
@@ -58,7 +55,7 @@ def _archive(options: argparse.Namespace) -> None:
     study = studies.load(root / "config" / f"{options.study}.yaml", schema)
     target = pack.default_target(study, root, __version__)
     if options.output:
-        target = output.target_of(options.output, options.force, _is_archive)
+        target = common.target_of(options.output, options.force, _is_archive)
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
     packed = pack.pack(study, root, target, options.agent)
@@ -67,7 +64,7 @@ def _archive(options: argparse.Namespace) -> None:
         return
     for line in study.left_out:
         print(line)
-    print(text_of(packed.sizes))
+    print(packed.sizes)
     print(printable(f"{packed.path}: {in_megabytes(packed.size)}"))
 
 
@@ -87,6 +84,6 @@ def _plain(sizes: Sizes) -> dict[str, object]:
     return {
         "kinds": {kind: size._asdict() for kind, size in sizes.kinds.items()},
         "runs": sizes.runs,
-        "bytes_per_run": sizes.per_run() if sizes.runs else None,
-        "packed_bytes_per_run": sizes.per_run(packed=True) if sizes.runs else None,
+        "bytes_per_run": sizes.per_run and sizes.per_run[0],
+        "packed_bytes_per_run": sizes.per_run and sizes.per_run[1],
     }

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stiffdice.cli import common
+
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-09.yaml -o listed.h5
@@ -21,20 +23,15 @@ are left out, unless --all is given.
 """
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    diff = commands.add_parser(
-        "diff",
-        help="say whether two results differ, where, and by how much",
-        description="Say whether two files, folders of results or archives differ, where, and by how much.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    diff = common.add_command(
+        commands, "diff", _diff, "say whether two results differ, where, and by how much", EXAMPLES
     )
     diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
     diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
     diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")
     diff.add_argument("--json", action="store_true", help="the same for programs, and all of it")
-    diff.set_defaults(call=_diff)
 
 
 def _diff(options: argparse.Namespace) -> int:

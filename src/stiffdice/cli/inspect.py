@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from stiffdice.cli import common
+
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-04.yaml -o throw.h5
@@ -14,18 +16,13 @@ examples:
 """
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    inspect = commands.add_parser(
-        "inspect",
-        help="say what a file holds: its verdict, its scene, its variables",
-        description="Say what a file of stiffdice holds: its verdict, its scene, its variables.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    inspect = common.add_command(
+        commands, "inspect", _inspect, "say what a file holds: its verdict, its scene, its variables", EXAMPLES
     )
     inspect.add_argument("file", metavar="FILE.h5")
-    inspect.add_argument("--json", action="store_true", help="the same for programs")
-    inspect.set_defaults(call=_inspect)
+    common.add_json(inspect)
 
 
 def _inspect(options: argparse.Namespace) -> None:

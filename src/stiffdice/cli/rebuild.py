@@ -11,6 +11,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from stiffdice import __version__
+from stiffdice.cli import common
 
 if TYPE_CHECKING:
     from stiffdice.archive.rebuild import Opened
@@ -28,16 +29,13 @@ is checked first, and not run if anything in it fails. Exit status: 0 if all dat
 differ, 2 if the archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
 """
 
+_SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    rebuild = commands.add_parser(
-        "rebuild",
-        help="make an archive again from its own content, and compare",
-        description="Make the results in an archive again, with the installed code if that is the archive's, else with "
-        "the archive's own in a sandbox, and compare them with what the archive holds.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    rebuild = common.add_command(
+        commands, "rebuild", _rebuild, "make an archive again from its own content, and compare", EXAMPLES
     )
     rebuild.add_argument("archive", metavar="ARCHIVE")
     rebuild.add_argument("-o", "--output", metavar="FOLDER", help="run it in this new folder, and leave it there")
@@ -46,29 +44,25 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     rebuild.add_argument(
         "--no-sandbox", action="store_true", help="without a sandbox: its code can read and change all that you can"
     )
-    rebuild.set_defaults(call=_rebuild)
 
 
 def _rebuild(options: argparse.Namespace) -> int:
-    from stiffdice.cli import output
-    from stiffdice.cli.options import whole
-
     if options.output is not None:
-        output.name_of("-o", options.output)
-    cores = whole("--cores", options.cores)
+        common.name_of("-o", options.output)
+    cores = common.whole("--cores", options.cores)
 
     # This takes about a second to import; bad input is told before.
     from stiffdice.archive.rebuild import opened, rebuild, way_of
-    from stiffdice.cli.progress import Notes
+    from stiffdice.cli.progress import notes
 
     with _told_to_stop(), ExitStack() as stack:
-        with Notes("rebuild:") as notes:
-            unpacked = stack.enter_context(opened(options.archive, options.output, notes.show))
+        with notes("rebuild:") as tell:
+            unpacked = stack.enter_context(opened(options.archive, options.output, tell))
             way = way_of(unpacked, not options.no_sandbox)
         if not unpacked.code.is_installed and not options.yes:
             _ask(unpacked, way)
-        with Notes("rebuild:") as notes:
-            rebuilt = rebuild(unpacked, way, cores, notes.show)
+        with notes("rebuild:") as tell:
+            rebuilt = rebuild(unpacked, way, cores, tell)
     print("\n".join(rebuilt.lines()))
     return 0 if rebuilt.ok else 1
 
@@ -89,9 +83,8 @@ def _ask(unpacked: Opened, way: Way) -> None:
 @contextmanager
 def _told_to_stop() -> Iterator[None]:
     """Clean up when told to stop: end what runs, remove what is temporary; the exit status is 128 and the signal's."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    for number in (number for number, handler in before.items() if handler is not signal.SIG_IGN):
-        signal.signal(number, _stop)
+    heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, _stop) for number in heard}
     try:
         yield
     finally:
@@ -100,6 +93,6 @@ def _told_to_stop() -> Iterator[None]:
 
 
 def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    for other in (signal.SIGTERM, signal.SIGHUP):  # the end of a login sends both
+    for other in _SIGNALS:
         signal.signal(other, signal.SIG_IGN)
     sys.exit(128 + number)

@@ -6,8 +6,7 @@ import argparse
 import shlex
 import sys
 
-from stiffdice.cli import output
-from stiffdice.cli.options import add_changes, number, steps_of, whole
+from stiffdice.cli import common
 from stiffdice.errors import printable
 
 EXAMPLES = """\
@@ -23,14 +22,10 @@ its verdict; 2 for bad input.
 """
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    run = commands.add_parser(
-        "run",
-        help="run one scene and store its trajectory and verdict",
-        description="Run one scene and store its trajectory and verdict in one HDF5 file.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    run = common.add_command(
+        commands, "run", _run, "run one scene and store its trajectory and verdict in one HDF5 file", EXAMPLES
     )
     run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
@@ -77,9 +72,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         action="store_true",
         help="book where the energy goes, for every bounce and for the run (takes some times as long)",
     )
-    output.add_force(run)
-    add_changes(run)
-    run.set_defaults(call=_run)
+    common.add_force(run)
+    common.add_changes(run)
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -88,13 +82,13 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.scene import validation
 
     scene = scenes.load(options.scene, options.overrides, options.preset)
-    steps, note = whole("--steps", options.steps), ""
+    steps, note = common.whole("--steps", options.steps), ""
     if options.dt is not None:
-        steps, note = steps_of(options.dt, scene.duration)
-    target = output.target_of(options.output, options.force, seal.is_sealed, options.scene)
+        steps, note = common.steps_of(options.dt, scene.duration)
+    target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
 
     # These take about a second to import; bad input is told before.
-    from stiffdice.cli.progress import Progress
+    from stiffdice.cli.progress import progress
     from stiffdice.dynamics import model_selection
     from stiffdice.integrators import registry as schemes
     from stiffdice.io.writer import write_dataset
@@ -110,16 +104,16 @@ def _run(options: argparse.Namespace) -> None:
     every = (
         default_every(steps)
         if options.every is None
-        else validation.count("every", whole("--every", options.every), at_most=steps)
+        else validation.count("every", common.whole("--every", options.every), at_most=steps)
     )
-    tolerance = schemes.TOLERANCE if options.tolerance is None else number("--tolerance", options.tolerance, "1")
-    budget = None if options.budget is None else whole("--budget", options.budget)
+    tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
+    budget = None if options.budget is None else common.whole("--budget", options.budget)
     method = scheme if options.simulator == backend.OURS else ""
     model, _ = model_selection.chosen(options.model, [scene], scene.duration / steps)
     backend.check_fit(options.simulator, scheme, scene, model)
     for line in run_page.doubts(scene, model, method, steps):
         print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
-    with Progress() as progress:
+    with progress() as show:
         run = simulate(
             scene,
             model=options.model,
@@ -129,7 +123,7 @@ def _run(options: argparse.Namespace) -> None:
             tolerance=tolerance,
             every=every,
             budget=budget,
-            progress=progress.show,
+            progress=show,
         )
     dataset = run_dataset(run)
     if options.ledger:
@@ -140,12 +134,5 @@ def _run(options: argparse.Namespace) -> None:
         print(printable(line))
     if options.model == model_selection.AUTO:
         print(run.model_reason)
-    print("\n".join(map(printable, run_page.lines(run, str(target), _advise(options)))))
-
-
-def _advise(options: argparse.Namespace) -> str:
-    """Return the command that says how accurate such a run is."""
-    words = ["stiffdice", "advise", options.scene]
-    words += [] if options.preset is None else ["--preset", options.preset]
-    words += [word for override in options.overrides for word in ("--set", override)]
-    return shlex.join([*words, "--error", "1%"])
+    advise = shlex.join(["stiffdice", "advise", *common.scene_words(options, options.overrides), "--error", "1%"])
+    print("\n".join(map(printable, run_page.lines(run, str(target), advise))))

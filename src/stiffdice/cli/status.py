@@ -10,6 +10,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from stiffdice.cli import common
+
 if TYPE_CHECKING:
     from stiffdice.study.status import Status
 
@@ -21,7 +23,8 @@ examples:
   stiffdice status quick --watch
   stiffdice status quick --json
 
-exit status: 0 all is done; 1 something failed; 3 something is not done yet; 2 bad input
+To be called in the project's folder. Exit status: 0 all is done; 1 something failed; 3 something is not done yet;
+2 bad input.
 """
 SCHEMA = "workflow/schemas/study.schema.yaml"
 SECONDS = 2.0
@@ -29,21 +32,19 @@ SECONDS = 2.0
 QUIET = 4
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    status = commands.add_parser(
+    status = common.add_command(
+        commands,
         "status",
-        help="say how far a study is: done, running, failed and why, time left, disk used",
-        description="Say how far a study is: what is done, what runs, what failed and why, the time left, the disk "
-        "used. To be called in the project's folder.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        _status,
+        "say how far a study is: done, running, failed and why, time left, disk used",
+        EXAMPLES,
     )
     status.add_argument("study", metavar="STUDY", nargs="?", help="a file in config/, without .yaml")
     status.add_argument("--watch", action="store_true", help="look every two seconds, until the run has ended")
     status.add_argument("--cores", type=int, metavar="N", help="for the time left (default: as many as are at work)")
-    status.add_argument("--json", action="store_true", help="the same for programs")
-    status.set_defaults(call=_status)
+    common.add_json(status)
 
 
 def _status(options: argparse.Namespace) -> int:

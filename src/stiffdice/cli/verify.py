@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from stiffdice import __version__
+from stiffdice.cli import common
 
 EXAMPLES = f"""\
 examples:
@@ -19,26 +20,24 @@ at all. docs/verify.md says what is checked, and how to check it without stiffdi
 """
 
 
-def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add(commands: common.Commands) -> None:
     """Add the command to the parser."""
-    verify = commands.add_parser(
+    verify = common.add_command(
+        commands,
         "verify",
-        help="check an archive or a folder of results: digests, seals, schema, physics",
-        description="Check an archive or a folder of results: every digest, every file's seal and schema, and whether "
-        "its numbers can be. What fails is named.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        _verify,
+        "check an archive or a folder of results: digests, seals, schema, physics",
+        EXAMPLES,
     )
     verify.add_argument("path", metavar="ARCHIVE|FOLDER", help="an archive, an unpacked one, results, or an .h5 file")
-    verify.add_argument("--json", action="store_true", help="the same for programs")
-    verify.set_defaults(call=_verify)
+    common.add_json(verify)
 
 
 def _verify(options: argparse.Namespace) -> int:
     from stiffdice.archive.verify import verify
-    from stiffdice.cli.progress import Progress
+    from stiffdice.cli.progress import progress
 
-    with Progress() as progress:
-        report = verify(options.path, progress.show)
+    with progress() as show:
+        report = verify(options.path, show)
     print(report.as_json() if options.json else "\n".join(report.lines()))
     return 0 if report.ok else 1

@@ -33,8 +33,10 @@ def temporary_of(target: Path) -> Path:
     Removes what processes of this host that are gone left of the same file; those of other hosts, and of other
     containers of this one, cannot be asked.
     """
+    import psutil
+
     here = host.name()
-    _remove(target, rf"{re.escape(here)}\.([0-9]+)", lambda found: not _is_alive(int(found[1])))
+    _remove(target, rf"{re.escape(here)}\.([0-9]+)", lambda found: not psutil.pid_exists(int(found[1])))
     return target.with_name(f".{target.name}.{here}.{os.getpid()}.part")
 
 
@@ -52,16 +54,6 @@ def _remove(target: Path, writer: str, is_gone: Callable[[re.Match[str]], bool])
             if found and is_gone(found):
                 with contextlib.suppress(OSError):
                     Path(entry).unlink()
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:  # another user's
-        return True
-    return True
 
 
 @contextlib.contextmanager

@@ -159,22 +159,12 @@ def started_at(process: int) -> float | None:
 
     Where the system does not tell when it started, 0.
     """
-    try:
-        stat = Path(f"/proc/{process}/stat").read_text(encoding="ascii", errors="replace")
-        booted = re.search(r"^btime (\d+)$", Path("/proc/stat").read_text(encoding="ascii"), re.MULTILINE)
-    except OSError:
-        return None if Path("/proc/self/stat").exists() else _answers(process)
-    state, *fields = stat.rpartition(")")[2].split()  # the name before it may hold anything
-    if state in "ZX" or booted is None:  # ended, and not yet fetched by its parent
-        return None
-    return int(booted[1]) + int(fields[18]) / os.sysconf("SC_CLK_TCK")
+    import psutil
 
-
-def _answers(process: int) -> float | None:
     try:
-        os.kill(process, 0)
-    except ProcessLookupError:
+        found = psutil.Process(process)
+        return None if found.status() in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD) else found.create_time()
+    except psutil.NoSuchProcess:
         return None
-    except OSError:  # it is somebody else's
-        pass
-    return 0.0
+    except psutil.AccessDenied:
+        return 0.0

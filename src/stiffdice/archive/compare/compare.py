@@ -7,25 +7,27 @@ absolutely; the shards of a sweep cell by cell, however the cells are dealt to t
 from __future__ import annotations
 
 import filecmp
-import itertools
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
+import xarray as xr
+
 from stiffdice.archive.compare import folders
-from stiffdice.archive.compare.datasets import Difference, datasets_difference
+from stiffdice.archive.compare.datasets import Difference, datasets_difference, holds_runs, runs_difference
+from stiffdice.archive.compare.folders import Folder
 from stiffdice.archive.compare.report import Comparison
-from stiffdice.archive.compare.shards import holds_runs, runs_difference, shards_difference
 from stiffdice.archive.extract import unzip
+from stiffdice.archive.manifest import is_regular
 from stiffdice.errors import InputError
 from stiffdice.io import isolation
 from stiffdice.io.reader import open_file
 
 __all__ = ["Comparison", "compare"]
 
-_LINE = 160  # characters of a line that are kept
+Pair = tuple[Sequence[str], Sequence[str]]  # of A and of B
 
 
 def compare(a: Path, b: Path, all_files: bool = False) -> Comparison:
@@ -40,61 +42,52 @@ def compare(a: Path, b: Path, all_files: bool = False) -> Comparison:
             one, other = (a, b) if left.is_dir() else (b, a)
             raise InputError(f"{one} is a folder, {other} a file: allowed are two files, two folders, two archives")
         if left.is_dir():
-            return _folders(left, right, all_files)
-        difference, identical = _data_difference(left.name, left, right), _equal(left, right)
-    return Comparison(() if difference.same else (difference,), files=1, identical=int(identical), single=True)
+            return _folders(folders.read("A", left), folders.read("B", right), all_files)
+        difference = _data_difference(left.name, [open_file(left)], [open_file(right)])
+        identical = int(filecmp.cmp(left, right, shallow=False))
+    return Comparison(() if difference.same else (difference,), files=1, identical=identical, single=True)
 
 
 def _unpacked(path: Path, stack: ExitStack) -> Path:
     """Return the path of a file or folder, of an archive that of a folder with what is in it, until the stack ends."""
     if not path.exists():
         raise InputError(f"{path}: No such file or directory")
-    if path.is_dir() or not _is_zip(path):
-        if path.is_file():
-            isolation.admit(path)
+    if path.is_dir():
+        return path
+    if not path.is_file():
+        raise InputError(f"{path}: neither a file nor a folder")
+    with path.open("rb") as file:
+        is_zip = file.read(4) in (b"PK\x03\x04", b"PK\x05\x06")
+    if not is_zip:
+        isolation.admit(path)
         return path
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stiffdice-diff-")))
     unzip(path, folder)
     return folder
 
 
-def _is_zip(path: Path) -> bool:
-    if not path.is_file():
-        raise InputError(f"{path}: neither a file nor a folder")
-    with path.open("rb") as file:
-        return file.read(4) in (b"PK\x03\x04", b"PK\x05\x06")
-
-
-def _equal(a: Path, b: Path) -> bool:
-    return filecmp.cmp(a, b, shallow=False)
-
-
-def _data_difference(name: str, a: Path, b: Path) -> Difference:
-    """Return how two HDF5 files of ours differ; raises InputError if one cannot be trusted."""
-    left, right = open_file(a), open_file(b)
-    if holds_runs(left) and holds_runs(right):
-        return runs_difference(name, [left], [right])
-    return datasets_difference(name, left, right)
-
-
-def _folders(a: Path, b: Path, all_files: bool) -> Comparison:
-    left, right = folders.read(a), folders.read(b)
+def _folders(left: Folder, right: Folder, all_files: bool) -> Comparison:
     # Only one of the two may know what shows timings.
     side = frozenset() if all_files else left.side | right.side
     one, other = (part.files - side - (frozenset() if all_files else part.unlisted) for part in (left, right))
-    both = {name for name in one & other if _are_equal(a / name, b / name)}
-    refused = isolation.refused(_opened(a, one - both) + _opened(b, other - both))
+    both = {name for name in one & other if _are_equal(left.top / name, right.top / name)}
     shards, others = folders.shards_of(one), folders.shards_of(other)
-    found: list[Difference] = []
-    told: set[str] = set(both)
+    # What is compared with what, by one name: all shards of a sweep with those of the same sweep, a file with a file.
+    pairs: dict[str, Pair] = {}
+    told = set(both)
     for name in shards.keys() & others.keys():
-        one_way, other_way = (
-            [top / file for file in part[name] if file not in both] for top, part in ((a, shards), (b, others))
-        )
-        found.append(_sided(shards_difference(name, one_way, other_way, refused), a, b))
+        pairs[name] = ([file for file in shards[name] if file not in both], [f for f in others[name] if f not in both])
         # The table beside them says how the cells are dealt.
         told |= {*shards[name], *others[name], f"{Path(name).parent.as_posix()}/{folders.LISTED}"}
-    found += [_sided(_pair(name, a / name, b / name, refused), a, b) for name in sorted((one & other) - told)]
+    pairs |= {name: ([name], [name]) for name in (one & other) - told}
+    refused = isolation.refused(
+        folder.top / name
+        for k, folder in enumerate((left, right))
+        for pair in pairs.values()
+        for name in pair[k]
+        if name.endswith(".h5") and is_regular(folder.top / name)
+    )
+    found = [_difference(name, pair, (left, right), refused) for name, pair in pairs.items()]
     return Comparison(
         tuple(sorted((part for part in found if not part.same), key=lambda part: (not part.numbers, part.name))),
         only_a=tuple(sorted(one - other - told)),
@@ -105,47 +98,52 @@ def _folders(a: Path, b: Path, all_files: bool) -> Comparison:
     )
 
 
-def _opened(top: Path, names: Iterable[str]) -> list[Path]:
-    """Return those of some files of a folder that are opened to be compared."""
-    return [top / name for name in sorted(names) if name.endswith(".h5") and folders.is_regular(top / name)]
-
-
 def _are_equal(a: Path, b: Path) -> bool:
     """Return whether two files, or two links, are the same; links are not followed."""
     if a.is_symlink() or b.is_symlink():
         return a.is_symlink() and b.is_symlink() and a.readlink() == b.readlink()
-    return folders.is_regular(a) and folders.is_regular(b) and _equal(a, b)
+    return is_regular(a) and is_regular(b) and filecmp.cmp(a, b, shallow=False)
 
 
-def _pair(name: str, a: Path, b: Path, refused: Mapping[str, InputError]) -> Difference:
-    """Return how two files of one name that are not equal differ."""
-    if not (folders.is_regular(a) and folders.is_regular(b)):
-        return Difference(name, unreadable=(f"{name} is a link, or no file",))
-    if a.suffix != ".h5":
-        return Difference(name, other=True, line=_first_line(a, b))
-    if wrong := [str(refused[path]) for path in map(str, (a, b)) if path in refused]:
+def _difference(name: str, pair: Pair, sides: tuple[Folder, Folder], refused: Mapping[str, InputError]) -> Difference:
+    """Return how files that are not equal differ: two of one name, or all shards of a sweep, named by their folder.
+
+    refused: what another process found wrong with files, by their paths (`isolation.refused`).
+    """
+    shards = pair != ([name], [name])
+    if not (shards or name.endswith(".h5")):
+        plain = all(is_regular(side.top / name) for side in sides)
+        return Difference(name, other=plain, unreadable=() if plain else (f"{name}: a link, or no file",))
+    wrong: list[str] = []
+    datasets: list[list[xr.Dataset]] = [[], []]
+    for side, names, found in zip(sides, pair, datasets, strict=True):
+        for file in names:
+            try:
+                found.append(_opened(side.top / file, shards, refused))
+            except InputError as error:
+                wrong.append(str(error).replace(f"{side.top}/", f"{side.letter}: "))
+    if wrong and not shards:
         return Difference(name, unreadable=tuple(wrong))
     try:
-        return _data_difference(name, a, b)
-    except InputError as error:
-        return Difference(name, unreadable=(str(error),))
+        difference = _data_difference(name, *datasets)
+    except ValueError as error:  # of xarray, where the shards of one side do not hold the same variables
+        return Difference(name, unreadable=(*wrong, f"shards that are not alike: {str(error).splitlines()[0]}"))
+    return replace(difference, unreadable=tuple(wrong))
 
 
-def _first_line(a: Path, b: Path) -> tuple[int, str, str] | None:
-    """Return the number of the first line in which two texts differ, and both; None if one is no text."""
-    with a.open("rb") as left, b.open("rb") as right:
-        for number, (one, other) in enumerate(itertools.zip_longest(left, right, fillvalue=b""), start=1):
-            if b"\0" in one or b"\0" in other:
-                return None
-            if one != other:
-                texts = [line[:_LINE].decode("utf-8", "replace").rstrip("\r\n") for line in (one, other)]
-                return number, texts[0], texts[1]
-    return None
+def _opened(path: Path, shard: bool, refused: Mapping[str, InputError]) -> xr.Dataset:
+    if not is_regular(path):
+        raise InputError(f"{path}: a link, or no file")
+    if str(path) in refused:
+        raise refused[str(path)]
+    dataset = open_file(path)
+    if shard and not holds_runs(dataset):
+        raise InputError(f"{path}: holds no runs in cells")
+    return dataset
 
 
-def _sided(found: Difference, a: Path, b: Path) -> Difference:
-    """Return the same with the side that an unreadable file is of instead of where that side is."""
-    told = found.unreadable
-    for top, side in sorted(((f"{a}/", "A: "), (f"{b}/", "B: ")), key=lambda item: -len(item[0])):
-        told = tuple(reason.replace(top, side) for reason in told)
-    return replace(found, unreadable=told)
+def _data_difference(name: str, a: Sequence[xr.Dataset], b: Sequence[xr.Dataset]) -> Difference:
+    """Return how two sets of shards differ, or two files."""
+    if all(map(holds_runs, [*a, *b])):
+        return runs_difference(name, a, b)
+    return datasets_difference(name, a[0], b[0])

@@ -1,17 +1,19 @@
-"""Two datasets: what they say besides values, and their values."""
+"""What differs between two datasets, or two sets of shards: what they say besides values, and their values."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.archive.compare.values import Values, difference, located
-from stiffdice.io.content_digest import Plain, plain, type_of
+from stiffdice.io.content_digest import CELL, Plain, plain, type_of
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,7 @@ class Difference:
     """How two files (or all shards of a sweep) of one name differ.
 
     values: in which variables. shapes, attributes: in what they say besides values. only_a, only_b: cells that one has.
-    line: of text that differs, its number and both texts. unreadable: why files cannot be read. other: whether bytes
-    differ that are no data. notes: what else is to say.
+    unreadable: why files cannot be read. other: whether bytes differ that are no data. notes: what else is to say.
     """
 
     name: str
@@ -42,7 +43,6 @@ class Difference:
     attributes: tuple[Aspect, ...] = ()
     only_a: tuple[str, ...] = ()
     only_b: tuple[str, ...] = ()
-    line: tuple[int, str, str] | None = None
     unreadable: tuple[str, ...] = ()
     other: bool = False
     notes: tuple[str, ...] = ()
@@ -58,9 +58,51 @@ class Difference:
         return not (self.numbers or self.attributes or self.other)
 
 
+def holds_runs(dataset: xr.Dataset) -> bool:
+    """Return whether a dataset is a shard: runs in cells."""
+    return {"cell", "member"} <= set(dataset.sizes) and all(
+        name in dataset.variables and dataset[name].dims == ("cell",) for name in CELL
+    )
+
+
+def runs_difference(name: str, a: Sequence[xr.Dataset], b: Sequence[xr.Dataset]) -> Difference:
+    """Return how the runs in two sets of shards differ, matched by contact law, stiffness and steps of their cells.
+
+    Raises ValueError, of xarray, where the shards of one side do not hold the same variables.
+    """
+    if not (a and b):
+        only = [tuple(_labels(_joined(part))) if part else () for part in (a, b)]
+        return Difference(name, only_a=only[0], only_b=only[1])
+    left, right = _joined(a), _joined(b)
+    _, *shared = np.intersect1d(_keys(left), _keys(right), assume_unique=True, return_indices=True)
+    found = datasets_difference(name, left.isel(cell=shared[0]), right.isel(cell=shared[1]))
+    # Where a cell is in the file says nothing: cells are dealt to files in many ways.
+    values = tuple(
+        replace(part, places=tuple(replace(place, index=()) for place in part.places)) for part in found.values
+    )
+    alone = [tuple(_labels(part.drop_isel(cell=at))) for part, at in zip((left, right), shared, strict=True)]
+    return replace(found, values=values, only_a=alone[0], only_b=alone[1])
+
+
+def _joined(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return all cells as one dataset, each once, in the order of their keys."""
+    whole = xr.concat(
+        parts, "cell", data_vars="minimal", coords="minimal", compat="override", combine_attrs="drop_conflicts"
+    )
+    return whole.isel(cell=np.unique(_keys(whole), return_index=True)[1])
+
+
+def _keys(dataset: xr.Dataset) -> npt.NDArray[np.void]:
+    return np.asarray(np.rec.fromarrays([dataset[name].values for name in CELL]))
+
+
+def _labels(dataset: xr.Dataset) -> list[str]:
+    return [located(dataset, ("cell",), (k,)) for k in range(dataset.sizes["cell"])]
+
+
 def datasets_difference(name: str, a: xr.Dataset, b: xr.Dataset) -> Difference:
     """Return how two datasets differ."""
-    left, right, notes = _overlap(a, b)
+    left, right, notes = _shared(a, b)
     found = (
         difference(left[key], right[key], partial(located, left, tuple(map(str, left[key].dims))))
         for key in left.variables
@@ -110,23 +152,25 @@ def _leaves(name: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Plain]
             yield f"{name}.{key}", json.dumps(value)
 
 
-def _overlap(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset, tuple[str, ...]]:
+def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset, tuple[str, ...]]:
     """Return of two datasets what can be compared value by value, and what is to say about the rest.
 
-    These are the variables that both have along the same dimensions. Where one goes on longer, its beginning is taken,
-    if the labels there are the same; what lies along other dimensions of two sizes is left out.
+    These are the variables that both have along the same dimensions, at the labels that both have. Nothing is compared
+    along dimensions of two sizes that have no labels.
     """
     shared = [name for name in a.variables if name in b.variables and a[name].dims == b[name].dims]
     left, right = (part.drop_vars([name for name in part.variables if name not in shared]) for part in (a, b))
     notes = []
-    for dimension in [name for name in left.sizes if left.sizes[name] != right.sizes[name]]:
-        size = min(left.sizes[dimension], right.sizes[dimension])
-        one, other = (part.isel({dimension: slice(size)}) for part in (left, right))
-        if all(one[name].equals(other[name]) for name in left.coords if left[name].dims == (dimension,)):
-            left, right = one, other
-            notes.append(f"compared up to {dimension} {size}, where the shorter ends")
+    for dimension in [name for name in left.sizes if left.sizes[name] != right.sizes.get(name)]:
+        if _is_labelled(left, dimension) and _is_labelled(right, dimension):
+            left, right = xr.align(left, right, join="inner", exclude=set(left.sizes) - {dimension})
+            notes.append(f"compared at the {left.sizes[dimension]} places along {dimension} that both have")
         else:
             along = [name for name in left.variables if dimension in left[name].dims]
             left, right = left.drop_vars(along), right.drop_vars(along)
-            notes.append(f"not compared along {dimension}: its places are others")
+            notes.append(f"not compared along {dimension}: its sizes differ, and its places have no labels")
     return left, right, tuple(notes)
+
+
+def _is_labelled(dataset: xr.Dataset, dimension: Hashable) -> bool:
+    return dimension in dataset.indexes and dataset.indexes[dimension].is_unique

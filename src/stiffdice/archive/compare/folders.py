@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from stiffdice.archive import manifest
+from stiffdice.archive import crate, manifest, preview
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.text_file import rows_of
@@ -15,7 +14,7 @@ from stiffdice.study import catalogue
 
 # What a study keeps of how it was made, and an archive of what is in it: from one rebuild to the next they differ.
 SIDE_FOLDERS = ("logs", "benchmarks", "__pycache__")
-SIDE_FILES = ("report.html", manifest.NAME, "ro-crate-metadata.json", "ro-crate-preview.html")
+SIDE_FILES = ("report.html", manifest.NAME, crate.NAME, preview.NAME)
 
 # Where the shards of a sweep are, under the sweep's folder, and what says which of them are in use.
 SHARDS, LISTED = "shards", "shards.csv"
@@ -26,34 +25,26 @@ _SHOWN = ("figures", "tables")
 
 @dataclass(frozen=True)
 class Folder:
-    """The files of a folder, by their paths in it (with /).
+    """A or B: where it lies, and its files, by their paths in it (with /).
 
     side: side files, and figures and tables that show timings. unlisted: shards of earlier grids.
     """
 
+    letter: str
+    top: Path
     files: frozenset[str]
     side: frozenset[str]
     unlisted: frozenset[str]
 
 
-def read(path: Path) -> Folder:
+def read(letter: str, path: Path) -> Folder:
     """Return what is in a folder; links are not followed. Raises InputError if it cannot be read.
 
     What shows timings is told by the study's own file, where that is beside its results, as in an archive.
     """
-    found = frozenset(_walk(path))
+    found = frozenset(name for name, _ in manifest.files_in(path))
     side = {name for name in found if _is_side(PurePosixPath(name))}.union(_timed(path, found))
-    return Folder(found, frozenset(side), frozenset(_unlisted(path, found)))
-
-
-def _walk(top: Path) -> Iterator[str]:
-    def refuse(error: OSError) -> None:
-        raise InputError(f"{error.filename}: {error.strerror}")
-
-    for folder, folders, files in os.walk(top, onerror=refuse):
-        linked = [name for name in folders if Path(folder, name).is_symlink()]
-        for name in (*files, *linked):
-            yield Path(folder, name).relative_to(top).as_posix()
+    return Folder(letter, path, found, frozenset(side), frozenset(_unlisted(path, found)))
 
 
 def _is_side(path: PurePosixPath) -> bool:
@@ -62,39 +53,38 @@ def _is_side(path: PurePosixPath) -> bool:
 
 
 def _timed(top: Path, files: Iterable[str]) -> Iterator[str]:
+    """Yield the figures and tables that show timings, as the file of their study says, if that is there."""
     shown: dict[Path, set[str]] = {}
     for name in files:
         path = PurePosixPath(name)
         if path.parent.name in _SHOWN:
             study = (top / path).resolve().parent.parent
             if study not in shown:
-                shown[study] = _showing_times(study)
+                try:
+                    plan = yaml_loader.load(study.parent.parent / "config" / f"{study.name}.yaml")
+                    shown[study] = catalogue.showing_times(plan)
+                except InputError:
+                    shown[study] = set()
             if f"{path.parent.name}/{path.stem}" in shown[study]:
                 yield name
-
-
-def _showing_times(study: Path) -> set[str]:
-    """Return what shows timings, of a study whose file is beside its results; none if that cannot be read."""
-    try:
-        plan = yaml_loader.load(study.parent.parent / "config" / f"{study.name}.yaml")
-    except InputError:
-        return set()
-    return catalogue.showing_times(plan)
 
 
 def _unlisted(top: Path, files: Iterable[str]) -> Iterator[str]:
     """Yield the shards that the table beside them does not list; none where it cannot be read."""
     for folder, shards in shards_of(files).items():
         try:
-            listed = {row["shard"] for row in rows_of(top / PurePosixPath(folder).with_name(LISTED))}
-        except (InputError, KeyError):
+            listed = listed_in(top / PurePosixPath(folder).with_name(LISTED))
+        except InputError:
             continue
         yield from (name for name in shards if PurePosixPath(name).stem not in listed)
 
 
-def is_regular(path: Path) -> bool:
-    """Return whether a path is a file, not a link to one, and nothing that reading might wait for."""
-    return path.is_file() and not path.is_symlink()
+def listed_in(table: Path) -> list[str]:
+    """Return the shards that a sweep was collected from; raises InputError if its `shards.csv` is no such table."""
+    try:
+        return [row["shard"] for row in rows_of(table)]
+    except KeyError:
+        raise InputError(f"{table}: not a table of shards") from None
 
 
 def shards_of(names: Iterable[str]) -> dict[str, list[str]]:

@@ -59,20 +59,16 @@ class Comparison:
                 lines += ["", part.name, *(f"  {line}" for line in about)]
         lines += _more(len(self.differences) - SHOWN, "files")
         if self.left_out:
-            lines += [
-                "",
-                f"left out: {_count(len(self.left_out), 'file')} of logs, times and the like; --all takes them",
-            ]
+            left_out = _count(len(self.left_out), "file")
+            lines += ["", f"left out: {left_out} of logs, times and the like; --all takes them"]
         return [printable(line) for line in lines]
 
     @property
     def verdict(self) -> str:
         """Whether A and B differ, in one line."""
         if not self.same:
-            different = ", ".join(self._how_different())
-            return (
-                f"the numbers are the same; different: {different}" if self.numbers_same else f"different: {different}"
-            )
+            different = f"different: {', '.join(self._how_different())}"
+            return f"the numbers are the same; {different}" if self.numbers_same else different
         if self.identical == self.files:
             return "the same, byte for byte" + ("" if self.single else f": {_count(self.files, 'file')}")
         how = "" if self.single else f": {_count(self.files, 'file')}, {self.identical} of them byte for byte"
@@ -165,9 +161,8 @@ def _about(part: Difference) -> Iterator[str]:
         yield from _about_values(values)
     yield from _more(len(part.values) - SHOWN, "variables")
     yield from _first(lambda aspect: f"{aspect.name}: {_against(aspect)}", part.shapes, "variables")
-    if part.line is not None:
-        number, a, b = part.line
-        yield from (f"from line {number} on:", f"  A: {_short(a)}", f"  B: {_short(b)}")
+    if part.other:
+        yield "other bytes"
     yield from part.notes
 
 

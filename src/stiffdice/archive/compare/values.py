@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.archive.compare.ulps import ulps
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.content_digest import CELL
-
-# So many places that differ are all told; of more, the first and the one of the largest difference.
-LISTED = 5
 
 Index = tuple[int, ...]
 
@@ -35,9 +31,10 @@ class Place:
 class Values:
     """How the values of one variable differ.
 
-    count: how many of `of`. unmeasured: those of which one is NaN or infinite. Of the others the largest difference in
-    ulp [1], relative [1] to the larger of the two magnitudes, and absolute [units]; of whole numbers the last alone, of
-    enums and text none. changes: of an enum, how many changed from which word to which.
+    count: how many of `of`. places: the first, and the one of the largest difference. unmeasured: those of which one is
+    NaN or infinite. Of the others the largest difference in ulp [1], relative [1] to the larger of the two magnitudes,
+    and absolute [units]; of whole numbers the last alone, of enums and text none. changes: of an enum, how many changed
+    from which word to which.
     """
 
     variable: str
@@ -65,38 +62,71 @@ def difference(a: xr.DataArray, b: xr.DataArray, where: Callable[[Index], str]) 
         differ = (differ | (np.signbit(x) != np.signbit(y))) & ~(np.isnan(x) & np.isnan(y))
     if not differ.any():
         return None
-    count, units = int(differ.sum()), str(a.attrs.get("units", "1"))
-    indices = [tuple(index) for index in np.argwhere(differ)[: LISTED + 1].tolist()]
-    titles = dict.fromkeys(indices, "") if count <= LISTED else {indices[0]: "first "}
-    found = Values(str(a.name), units, differ.size, count, (), changes=_changes(a, b, differ))
+    count, first = int(differ.sum()), _first(differ)
     measured = differ & np.isfinite(x) & np.isfinite(y) if is_number else np.zeros_like(differ)
-    if measured.any():
-        found, place = _measured(found, x, y, measured)
-        if count > LISTED:
-            titles[place] = f"{titles.get(place, '')}{'and ' if place in titles else ''}largest "
-    places = (
-        Place(f"{title}at {where(index)}", index, text(a, a.values[index]), text(b, b.values[index]))
-        for index, title in titles.items()
+    largest, amounts = _largest(x, y, measured) if measured.any() else (first, {})
+    titles = {first: "first "}
+    if amounts:
+        titles[largest] = "first and largest " if largest == first else "largest "
+    if count == 1:
+        titles[first] = ""
+    return Values(
+        str(a.name),
+        str(a.attrs.get("units", "1")),
+        differ.size,
+        count,
+        tuple(
+            Place(f"{title}at {where(index)}", index, text(a, x[index]), text(b, y[index]))
+            for index, title in titles.items()
+        ),
+        unmeasured=count - int(measured.sum()) if is_number else 0,
+        changes=_changes(a, b, differ),
+        **amounts,
     )
-    return replace(found, places=tuple(places), unmeasured=count - int(measured.sum()) if is_number else 0)
 
 
-def _measured(
-    found: Values, x: npt.NDArray[Any], y: npt.NDArray[Any], measured: npt.NDArray[np.bool_]
-) -> tuple[Values, Index]:
-    """Return the same with the largest of the flagged differences, and where that is."""
+def _first(flags: npt.NDArray[np.bool_]) -> Index:
+    return tuple(np.argwhere(flags)[0].tolist())
+
+
+def _largest(x: npt.NDArray[Any], y: npt.NDArray[Any], measured: npt.NDArray[np.bool_]) -> tuple[Index, dict[str, Any]]:
+    """Return where the largest of the flagged differences is (absolutely), and the largest of each measure."""
     has_floats = "f" in x.dtype.kind + y.dtype.kind
     wider = np.result_type(x.dtype, y.dtype) if has_floats else np.dtype(np.float64)
     left, right = x[measured].astype(wider), y[measured].astype(wider)
     with np.errstate(over="ignore"):  # two large numbers of opposite sign may be further apart than a double can say
         apart = np.abs(left - right)
-    place = tuple(np.argwhere(measured)[int(apart.argmax())].tolist())
-    found = replace(found, absolute=float(apart.max()))
+    found: dict[str, Any] = {"absolute": float(apart.max())}
     if has_floats:
         scale = np.maximum(np.abs(left), np.abs(right))
         share = np.minimum(apart / np.where(scale > 0, scale, 1), 2.0)
-        found = replace(found, ulp=int(ulps(left, right).max()), relative=float(share.max()))
-    return found, place
+        found |= {"ulp": int(ulps(left, right).max()), "relative": float(share.max())}
+    return tuple(np.argwhere(measured)[int(apart.argmax())].tolist()), found
+
+
+def ulps(a: npt.NDArray[np.floating[Any]], b: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint64]:
+    """Return how many steps of `numpy.nextafter` lead from `a` to `b`, elementwise, in their shape.
+
+    A unit in the last place (ulp) is such a step, here as everywhere in `stiffdice diff`: from 1.0 up it is 2⁻⁵², down
+    2⁻⁵³, and from zero 5e-324. Steps are counted through zero and the subnormal numbers; -0.0 is where 0.0 is. From
+    the largest double to infinity is one.
+
+    a, b: of one type (float16, float32 or float64) and shape, without NaN. Floating-point numbers of one sign are in
+    the order of their bits read as whole numbers (IEEE 754), which is what makes them countable.
+    """
+    places_a, places_b = _places(a), _places(b)
+    # Modulo 2⁶⁴ the difference is right even where it is beyond int64.
+    up, down = places_b.view(np.uint64) - places_a.view(np.uint64), places_a.view(np.uint64) - places_b.view(np.uint64)
+    return np.where(places_b > places_a, up, down)
+
+
+def _places(values: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.int64]:
+    """Return the place of each number in the row of all of its type, both zeros at 0."""
+    native = np.ascontiguousarray(values, values.dtype.newbyteorder("=")).reshape(np.shape(values))
+    whole = np.dtype(f"i{native.dtype.itemsize}")
+    bits = native.view(whole)
+    lowest = np.iinfo(whole).min
+    return np.where(bits < 0, lowest - bits, bits).astype(np.int64)
 
 
 def _changes(a: xr.DataArray, b: xr.DataArray, differ: npt.NDArray[np.bool_]) -> tuple[str, ...]:
@@ -104,9 +134,9 @@ def _changes(a: xr.DataArray, b: xr.DataArray, differ: npt.NDArray[np.bool_]) ->
     if "flag_meanings" not in a.attrs:
         return ()
     found = Counter(zip(a.values[differ].tolist(), b.values[differ].tolist(), strict=True))
-    pairs = found.most_common()
     return tuple(
-        f"{number} from {text(a, np.int8(one))} to {text(b, np.int8(other))}" for (one, other), number in pairs
+        f"{number} from {text(a, np.int8(one))} to {text(b, np.int8(other))}"
+        for (one, other), number in found.most_common()
     )
 
 
@@ -132,8 +162,7 @@ def _at(dataset: xr.Dataset, dimension: str, k: int) -> str:
         return _label(labels, k)
     if dimension == "cell" and all(name in dataset.variables for name in CELL):
         return ", ".join(_label(dataset[name], k) for name in CELL)
-    labels_of = [variable for variable in dataset.coords.values() if variable.dims == (dimension,)]
-    told = ", ".join(_label(labels, k) for labels in labels_of)
+    told = ", ".join(_label(labels, k) for labels in dataset.coords.values() if labels.dims == (dimension,))
     return f"{dimension} {k}" + (f" ({told})" if told else "")
 
 

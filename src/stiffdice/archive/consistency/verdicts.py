@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import NamedTuple
 
-import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
@@ -19,24 +17,22 @@ from stiffdice.simulation.outcome import Verdict
 ENDINGS = (Verdict.UNRESOLVED, Verdict.SANK, Verdict.STALLED, Verdict.UNDECIDED)
 
 
-class Limits(NamedTuple):
-    """Tolerances of the criteria asked, by name; a text says six digits of base + tolerance, so at least and most."""
+# How far a limit in a text of six digits may be from the number that it stands for, relative to it.
+_SIX_DIGITS = 5e-6
 
-    least: dict[str, float]
-    most: dict[str, float]
+Limits = tuple[dict[str, float], dict[str, float]]  # tolerances of the criteria asked, by name: at least and at most
 
 
 def limits_in(text: str) -> Limits:
     """Return the limits in a file's attribute `criteria`; raises ValueError if it says something else."""
-    limits = Limits({}, {})
+    least, most = {}, {}
     for part in text.split("; "):
         told = re.fullmatch(r"(\w+): (\w+) <= (\S+)", part)
         if told is None or told[1] not in CRITERIA or told[2] != CRITERIA[told[1]].MEASURE:
             raise ValueError(f"criteria = {text!r}: allowed are parts such as energy: energy_ratio <= 1.05")
         limit, base = float(told[3]), CRITERIA[told[1]].BASE
-        half = 0.5 * 10.0 ** (np.floor(np.log10(limit)) - 5) if limit > 0 else 0.0
-        limits.least[told[1]], limits.most[told[1]] = limit - half - base, limit + half - base
-    return limits
+        least[told[1]], most[told[1]] = limit * (1 - _SIX_DIGITS) - base, limit * (1 + _SIX_DIGITS) - base
+    return least, most
 
 
 def problems(dataset: xr.Dataset, measures: Mapping[str, npt.ArrayLike], limits: Limits | None) -> list[str]:
