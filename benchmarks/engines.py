@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
 from benchmarks.case import Case, Effort, Missing
 from benchmarks.scenes import STEP_SIZE, scene_of
 from stiffdice.dynamics.state import STATE, start_of
-from stiffdice.integrators import registry as schemes
+from stiffdice.errors import NotInstalledError
+from stiffdice.simulation.engines.adapter import Engine
+from stiffdice.simulation.engines.registry import adapter_of
 
 # By adapter: what it is called, most steps of a call (fewer than the 100,000 of the listing are spent in the air, at
 # the engine's best), and what holds it back.
@@ -28,17 +28,13 @@ ENGINES = {
 }
 
 
-def _adapter(name: str) -> Any:
-    return importlib.import_module(f"stiffdice.simulation.engines.{name}")
-
-
 def cases(effort: Effort) -> Iterator[Case | Missing]:
     """Yield the throw and its vertical part, gated; an engine that is not installed, or cannot do it, is missing."""
     for name, (title, most, holds) in ENGINES.items():
         try:
-            adapter = _adapter(name)
-        except ImportError as error:
-            yield Missing(name, f"{title} cannot be loaded: {str(error).splitlines()[0]}")
+            adapter = adapter_of(name.removesuffix("_loop"))
+        except NotInstalledError as error:
+            yield Missing(name, f"{title}: {str(error).splitlines()[0]}")
             continue
         steps = min(most, effort.steps)
         for model in ("tumbling", "vertical"):
@@ -55,13 +51,13 @@ def cases(effort: Effort) -> Iterator[Case | Missing]:
                 lambda adapter=adapter, model=model, steps=steps: _standing(adapter, model, steps),  # type: ignore[misc]
                 effort.slow,
                 holds,
-                version=str(adapter.versions()),
+                version=adapter.version(),
             )
 
 
-def _standing(adapter: Any, model: str, steps: int) -> Callable[[], int]:
+def _standing(adapter: type[Engine], model: str, steps: int) -> Callable[[], int]:
     """Return what takes so many steps with an engine that stands at the launch."""
     scene = scene_of("gated", steps)
-    engine = adapter.start(scene, model, start_of(scene, model), STEP_SIZE, schemes.TOLERANCE)
+    engine = adapter(scene, model, start_of(scene, model), STEP_SIZE)
     states = np.zeros(1, STATE)
     return lambda: int(engine.advance(states, steps))

@@ -72,9 +72,9 @@ CHANGES = {
     "dynamics/state.py": [('{"vertical", "sliding", "tumbling"}', '{"vertical", "sliding", "tumbling", "gliding"}')],
     "simulation/engines/registry.py": [
         (
-            "_SCIPY = ",
-            "def _mine() -> Any:\n    import stiffdice.simulation.engines.mine\n\n"
-            "    return stiffdice.simulation.engines.mine\n\n\n_SCIPY = ",
+            "def _scipy(",
+            "def _mine() -> type[Engine]:\n    from stiffdice.simulation.engines.mine import NumpyLoop\n\n"
+            "    return NumpyLoop\n\n\ndef _scipy(",
         ),
         ('    "numpy": Peer(', '    "mine": Peer(_mine, "Mine", "nothing"),\n    "numpy": Peer('),
     ],

@@ -349,9 +349,9 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
     for preset in ("as_listed", "as_written"):
         scene = load(ROOT / "config/scenes/figure-09.yaml", preset=preset)
         run = run_dataset(simulate(scene, model="sliding", steps=400, every=1), f"fall, {preset.replace('_', ' ')}")
-        books = energy_budget.keep(scene, model="sliding", steps=400)
+        ledger = energy_budget.ledger(scene, model="sliding", steps=400)
         path = folder / f"results/tiny/runs/fall.{preset}.h5"
-        write_dataset(run.assign(energy_budget.variables(books)), path)
+        write_dataset(run.assign(ledger.data_vars), path)
     data = {preset: open_file(folder / f"results/tiny/runs/fall.{preset}.h5") for preset in ("as_listed", "as_written")}
     drawn = [str(folder / f"results/tiny/figures/position.{suffix}") for suffix in ("svg", "png")]
     figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml", study_schema).dpi, drawn)

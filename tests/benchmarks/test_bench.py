@@ -23,7 +23,7 @@ from benchmarks.scenes import scene_of
 from benchmarks.store import PART, dataset_of, last_in, path_for
 
 from stiffdice.cli.main import main
-from stiffdice.errors import StiffdiceError
+from stiffdice.errors import NotInstalledError, StiffdiceError
 from stiffdice.io.reader import open_file
 from stiffdice.simulation import fixed_step
 
@@ -132,10 +132,14 @@ def test_every_benchmark_says_what_it_measures_and_why_it_does_not(monkeypatch, 
 
 
 def test_an_engine_that_is_not_installed_costs_a_line(monkeypatch):
-    monkeypatch.setattr(engines, "ENGINES", {"no_such_engine": ("Nothing", 10, "")})
-    assert engines.cases(QUICK).__next__() == Missing(
-        "no_such_engine", "Nothing cannot be loaded: No module named 'stiffdice.simulation.engines.no_such_engine'"
-    )
+    def missing(name):
+        raise NotInstalledError("simulator = drake: needs the package drake, which is not installed")
+
+    monkeypatch.setattr(engines, "adapter_of", missing)
+    monkeypatch.setattr(engines, "ENGINES", {"drake": ("Drake", 10, "")})
+    assert list(engines.cases(QUICK)) == [
+        Missing("drake", "Drake: simulator = drake: needs the package drake, which is not installed")
+    ]
 
 
 # The logic, on times made up.

@@ -282,7 +282,7 @@ def forged_files(folder: Path) -> Reader:
 
 
 class _Tries:
-    """One child of `quarantine` for all cases of this process."""
+    """One child of `isolation` for all cases of this process."""
 
     child = None
 

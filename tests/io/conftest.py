@@ -18,8 +18,8 @@ def written(tmp_path_factory, shards, collected):
     """A file of each kind that data are in, as the workflow writes them: kind → path."""
     folder = tmp_path_factory.mktemp("written")
     scene = from_mapping({"launch": {"angular_momentum": [0.1, 0.2, 0.3]}})
-    books = energy_budget.keep(scene, model="tumbling", scheme="symplectic_euler", steps=3000)
-    run = run_dataset(simulate(scene, steps=3000, every=50)).assign(energy_budget.variables(books))
+    ledger = energy_budget.ledger(scene, model="tumbling", scheme="symplectic_euler", steps=3000)
+    run = run_dataset(simulate(scene, steps=3000, every=50)).assign(ledger.data_vars)
     found = friction_chatter.measure(from_mapping({}), **CHATTER)
     datasets = {
         "run": run,

@@ -28,7 +28,7 @@ with logged() as say:
         )
         dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
         if planned.simulator == OURS and planned.scheme in energy_budget.BOOKED:
-            books = energy_budget.keep(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
-            dataset = dataset.assign(energy_budget.variables(books))
+            ledger = energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
+            dataset = dataset.assign(ledger.data_vars)
     write_dataset(dataset, snakemake.output[0])
     say(f"simulation: {watch.seconds:.3f} s")

@@ -89,7 +89,7 @@ def _run(options: argparse.Namespace) -> None:
 
     # These take about a second to import; bad input is told before.
     from stiffdice.cli.progress import progress
-    from stiffdice.dynamics import model_selection
+    from stiffdice.dynamics.model_selection import AUTO
     from stiffdice.integrators import registry as schemes
     from stiffdice.io.writer import write_dataset
     from stiffdice.report import run_page
@@ -97,10 +97,10 @@ def _run(options: argparse.Namespace) -> None:
     from stiffdice.simulation.dataset import run_dataset
     from stiffdice.simulation.run import default_every, simulate
 
-    scheme = backend.scheme_of(options.simulator, options.scheme)
+    setup = backend.setup_of(scene, options.model, options.simulator, options.scheme, steps)
     if options.ledger:
-        validation.choice("--ledger: simulator", options.simulator, [backend.OURS])
-        validation.choice("--ledger: scheme", scheme, energy_budget.BOOKED)
+        validation.choice("--ledger: simulator", setup.simulator, [backend.OURS])
+        validation.choice("--ledger: scheme", setup.scheme, energy_budget.BOOKED)
     every = (
         default_every(steps)
         if options.every is None
@@ -108,17 +108,14 @@ def _run(options: argparse.Namespace) -> None:
     )
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
-    method = scheme if options.simulator == backend.OURS else ""
-    model, _ = model_selection.chosen(options.model, [scene], scene.duration / steps)
-    backend.check_fit(options.simulator, scheme, scene, model)
-    for line in run_page.doubts(scene, model, method, steps):
+    for line in run_page.doubts(scene, setup.model, setup.own_scheme or "", steps):
         print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
     with progress() as show:
         run = simulate(
             scene,
             model=options.model,
             simulator=options.simulator,
-            scheme=scheme,
+            scheme=options.scheme,
             steps=steps,
             tolerance=tolerance,
             every=every,
@@ -127,12 +124,13 @@ def _run(options: argparse.Namespace) -> None:
         )
     dataset = run_dataset(run)
     if options.ledger:
-        books = energy_budget.keep(scene, model=run.model, scheme=scheme, steps=steps, budget=int(run.steps_done[0]))
-        dataset = dataset.assign(energy_budget.variables(books))
+        done = int(run.steps_done[0])
+        ledger = energy_budget.ledger(scene, model=run.model, scheme=run.scheme, steps=steps, budget=done)
+        dataset = dataset.assign(ledger.data_vars)
     write_dataset(dataset, target)
     for line in filter(None, [*scene.derived, note]):
         print(printable(line))
-    if options.model == model_selection.AUTO:
+    if options.model == AUTO:
         print(run.model_reason)
     advise = shlex.join(["stiffdice", "advise", *common.scene_words(options, options.overrides), "--error", "1%"])
     print("\n".join(map(printable, run_page.lines(run, str(target), advise))))

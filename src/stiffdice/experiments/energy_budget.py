@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import attrgetter
 
 import numpy as np
 import xarray as xr
@@ -18,18 +17,18 @@ from stiffdice.simulation import dataset, energy_budget
 
 SCHEME = "symplectic_euler"
 
-# By name: where it is among the bounces of a ledger, and what it is [J].
+# Of a ledger's bounces.
 _OF_BOUNCES = {
-    "damping_work": ("works.damping_work", "work of damping on nodes below the ground"),
-    "drag_work": ("works.drag_work", "work of the ungated law on nodes above the ground during the bounce"),
-    "friction_work": ("works.friction_work", "work of friction on nodes below the ground"),
-    "scheme_work": ("works.scheme_work", "what the scheme itself made, or lost if negative"),
-    "energy_before": ("energy_before", "energy before the bounce"),
+    "damping_work": "work of damping on nodes below the ground",
+    "drag_work": "work of the ungated law on nodes above the ground during the bounce",
+    "friction_work": "work of friction on nodes below the ground",
+    "scheme_work": "what the scheme itself made, or lost if negative",
+    "energy_before": "energy before the bounce",
 }
-# The same of a ledger.
+# Of its run, by the ledger's name.
 _OF_RUNS = {
-    "flight_drag_work": ("flights.drag_work", "work of the ungated law in flight"),
-    "run_scheme_work": ("run.scheme_work", "what the scheme made in the whole run, or lost if negative"),
+    "flight_drag_work": ("flight_drag_work", "work of the ungated law in flight"),
+    "scheme_work": ("run_scheme_work", "what the scheme made in the whole run, or lost if negative"),
 }
 
 
@@ -48,18 +47,16 @@ def measure(
     """
     counts = options.counts("steps", steps)
     ledgers = [
-        [energy_budget.keep(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=n) for n in counts]
+        [energy_budget.ledger(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=n) for n in counts]
         for law in LAWS
     ]
     grid = ("contact", "steps", "bounce")
     variables = {"omega_h": of_cells("omega_h", [linear_theory.omega_h(scene, count) for count in counts], "steps")}
-    for name, (path, text) in _OF_BOUNCES.items():
-        found = [[_padded(attrgetter(path)(ledger.bounces), bounces) for ledger in row] for row in ledgers]
+    for name, text in _OF_BOUNCES.items():
+        found = [[_padded(ledger[f"bounce_{name}"].values, bounces) for ledger in row] for row in ledgers]
         variables[name] = quantity(grid, found, text, "J")
-    for name, (path, text) in _OF_RUNS.items():
-        variables[name] = quantity(
-            grid[:2], [[float(attrgetter(path)(part)) for part in row] for row in ledgers], text, "J"
-        )
+    for name, (stored, text) in _OF_RUNS.items():
+        variables[stored] = quantity(grid[:2], [[float(ledger[name]) for ledger in row] for row in ledgers], text, "J")
     miss = [[_miss(ledger) for ledger in row] for row in ledgers]
     text = "how far all parts are from adding up to the change of energy of the run"
     variables["miss"] = quantity(grid[:2], miss, text, "J")
@@ -73,9 +70,10 @@ def measure(
     return xr.Dataset(variables, coordinates, attributes)
 
 
-def _miss(ledger: energy_budget.Ledger) -> float:
+def _miss(ledger: xr.Dataset) -> float:
     """Return how far the works are from the change of energy of a run [J]."""
-    return abs(float(ledger.run.energy_change - (ledger.end_energy - ledger.launch_energy)))
+    change = ledger["damping_work"] + ledger["drag_work"] + ledger["friction_work"] + ledger["scheme_work"]
+    return abs(float(change - (ledger["end_energy"] - ledger["launch_energy"])))
 
 
 def _padded(values: Array, count: int) -> Array:

@@ -96,7 +96,7 @@ def measure(
 def _by_lsoda(scene: Scene, launch: States, tolerance: float) -> tuple[Array, int]:
     """Return the centre's places [m], shape (SAMPLES, 3), and evaluations."""
     states = np.zeros(SAMPLES, STATE)
-    run = scipy_ivp.start(scene, MODEL, launch, scene.duration / SAMPLES, tolerance)
+    run = scipy_ivp.Lsoda(scene, MODEL, launch, scene.duration / SAMPLES, tolerance)
     evaluations = run.advance(states, 1)
     return states["position"], evaluations
 

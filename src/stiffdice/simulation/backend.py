@@ -1,4 +1,4 @@
-"""Who makes a run: stiffdice, or an outside engine (`peers/`), of which nothing is loaded until it is asked for.
+"""Who makes a run: stiffdice, or an outside engine (`engines/`), of which nothing is loaded until it is asked for.
 
 The engines' part is found by its name at run time, which `code_digest` does not follow: what stiffdice computes itself
 does not depend on it. A file of an engine's run adds `code_of` to its digest.
@@ -7,9 +7,10 @@ does not depend on it. A file of an engine's run adds `code_of` to its digest.
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import Any, NamedTuple
 
 from stiffdice import __version__
+from stiffdice.dynamics import model_selection
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -18,27 +19,82 @@ OURS = "stiffdice"
 
 DEFAULT_SCHEME = "symplectic_euler"  # the paper's
 
-_DRIVING = "stiffdice.simulation.engines.driver"
+_DRIVER = "stiffdice.simulation.engines.driver"
 
 
-def driving() -> Any:
+class Setup(NamedTuple):
+    """What is run, and by what.
+
+    model_reason: why that model, where `auto` was asked. scheme: of the time steps, an engine's own with an engine.
+    steps: to the scene's duration.
+    """
+
+    scene: Scene
+    model: str
+    model_reason: str
+    simulator: str
+    scheme: str
+    steps: int
+
+    @property
+    def step_size(self) -> float:
+        """Of a time step [s]."""
+        return self.scene.duration / self.steps
+
+    @property
+    def own_scheme(self) -> str | None:
+        """The scheme if it is one of `schemes.SCHEMES`; None for an engine's."""
+        return self.scheme if self.simulator == OURS else None
+
+    @property
+    def version(self) -> str:
+        """The name and version of what makes the run."""
+        return version_of(self.simulator)
+
+    @property
+    def lag(self) -> float:
+        """By how many steps the velocity is behind the place, as `schemes.LAGS`."""
+        return schemes.LAGS[self.scheme] if self.simulator == OURS else float(_adapter_of(self.simulator).LAG)
+
+    @property
+    def budget(self) -> int:
+        """The most work of a run, unless told otherwise: steps, or force evaluations of what takes its own steps."""
+        if self.simulator == OURS:
+            return schemes.budget_of(self.scheme, self.steps)
+        return schemes.BUDGET if driver().ENGINES[self.simulator].own_steps else self.steps
+
+
+def setup_of(scene: Scene, model: str, simulator: str, scheme: str | None, steps: int) -> Setup:
+    """Return what is to be run: model `auto` resolved, scheme None filled in, the fit to the scene checked.
+
+    Raises InputError for an unknown name, a number of steps out of range, a model that the scene, the scheme or the
+    engine does not allow, and an engine that is not installed.
+    """
+    scheme = scheme_of(simulator, scheme)
+    steps = validation.count("steps", steps)
+    model, reason = model_selection.chosen(model, [scene], scene.duration / steps)
+    check_fit(simulator, scheme, scene, model)
+    return Setup(scene, model, reason, simulator, scheme, steps)
+
+
+def driver() -> Any:
     """Return the module that makes runs with engines."""
-    return importlib.import_module(_DRIVING)
+    return importlib.import_module(_DRIVER)
 
 
 def code_of(simulator: str) -> tuple[str, ...]:
     """Return the modules that a simulator's runs stand on besides ours."""
-    return () if simulator == OURS else (_DRIVING,)
+    return () if simulator == OURS else (_DRIVER,)
 
 
-def adapter_of(simulator: str) -> Any:
-    """Return the adapter of an engine; raises InputError for one that is not known or not installed."""
-    return driving().adapter_of(simulator)
+def _adapter_of(simulator: str) -> Any:
+    validation.choice("simulator", simulator, (OURS, *driver().ENGINES))
+    return driver().adapter_of(simulator)
 
 
 def version_of(simulator: str) -> str:
     """Return the name and version of what makes the runs."""
-    return f"{OURS} {__version__}" if simulator == OURS else str(adapter_of(simulator).versions())
+    return f"{OURS} {__version__}" if simulator == OURS else str(_adapter_of(simulator).version())
 
 
 def scheme_of(simulator: str, scheme: str | None) -> str:
@@ -48,20 +104,8 @@ def scheme_of(simulator: str, scheme: str | None) -> str:
     """
     if simulator == OURS:
         return validation.choice("scheme", DEFAULT_SCHEME if scheme is None else scheme, schemes.SCHEMES)
-    own = str(adapter_of(simulator).SCHEME)
+    own = str(_adapter_of(simulator).SCHEME)
     return own if scheme is None else validation.choice(f"simulator = {simulator}: scheme", scheme, [own])
-
-
-def lag_of(simulator: str, scheme: str) -> float:
-    """Return by how many steps the velocity is behind the place, as `registry.LAGS`."""
-    return schemes.LAGS[scheme] if simulator == OURS else float(adapter_of(simulator).LAG)
-
-
-def budget_of(simulator: str, scheme: str, steps: int) -> int:
-    """Return the most work of a run, unless told otherwise: steps, or force evaluations of what takes its own steps."""
-    if simulator == OURS:
-        return schemes.budget_of(scheme, steps)
-    return schemes.BUDGET if driving().own_steps(simulator) else steps
 
 
 def check_fit(simulator: str, scheme: str, scene: Scene, model: str) -> None:
@@ -69,4 +113,4 @@ def check_fit(simulator: str, scheme: str, scene: Scene, model: str) -> None:
     if simulator == OURS:
         schemes.check_fit(scheme, scene, model)
     else:
-        driving().check_fit(simulator, scene, model)
+        driver().check_fit(simulator, scene, model)

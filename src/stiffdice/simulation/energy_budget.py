@@ -20,13 +20,13 @@ changes by the works of damping, drag and friction, and by the scheme's work, th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
-from stiffdice.dynamics import energy, model_selection
+from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import LAWS, height_of, node_force, normal_force, reaches
 from stiffdice.dynamics.models.registry import MODELS
@@ -35,6 +35,8 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
+from stiffdice.simulation import backend
+from stiffdice.simulation.backend import Setup
 
 # Schemes whose every step has a force to book.
 BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
@@ -80,13 +82,23 @@ _VIEW = np.dtype(
     ]
 )
 
-# Where the books stand: steps done, bounces so far, and whether one is going on.
-_STAND = np.dtype([("done", np.int64), ("bounces", np.int64), ("in_bounce", np.bool_)])
+# Where the books stand: steps done, bounces so far, whether one is going on, energies [J] at the launch and now.
+_STAND = np.dtype(
+    [
+        ("done", np.int64),
+        ("bounces", np.int64),
+        ("in_bounce", np.bool_),
+        ("launch_energy", np.float64),
+        ("energy", np.float64),
+    ]
+)
 
 # Compensated sums over the steps of a run, of its flights, or of the bounce going on.
 _ACCOUNT = np.dtype([("total", np.float64, _SIZE), ("rest", np.float64, _SIZE)])
 _RUN, _FLIGHTS, _BOUNCE = range(3)
 
+# A bounce. first_step: the last with every node above the ground (0 for a launch from within it). last_step: the first
+# in the air again, or the ledger's last where it has not ended. Energies [J]: at those steps; the most in the springs.
 _ROW = np.dtype(
     [
         ("first_step", np.int64),
@@ -100,139 +112,49 @@ _ROW = np.dtype(
 )
 
 
-@dataclass(frozen=True)
-class Works:
-    """The AMOUNTS [J] of a span of steps, shape () each, or of many, shape (bounce,) each."""
-
-    damping_work: Array
-    drag_work: Array
-    friction_work: Array
-    spring_work: Array
-    gravity_work: Array
-    spring_defect: Array
-    gravity_defect: Array
-    kick_defect: Array
-
-    @property
-    def scheme_work(self) -> Array:
-        """What the scheme itself made, or lost if negative [J]."""
-        return self.spring_defect + self.gravity_defect + self.kick_defect
-
-    @property
-    def energy_change(self) -> Array:
-        """What all of it adds up to: the change of kinetic, potential and elastic energy [J]."""
-        return self.damping_work + self.drag_work + self.friction_work + self.scheme_work
-
-
-@dataclass(frozen=True)
-class Bounces:
-    """A row for each bounce, shape (bounce,) each.
-
-    first_step: the last with every node above the ground (0 for a launch from within it). last_step: the first in the
-    air again, or the ledger's last where ended is False. energy_before, energy_after: at those steps [J].
-    largest_elastic_energy: the most that the springs held [J].
-    """
-
-    first_step: npt.NDArray[np.int64]
-    last_step: npt.NDArray[np.int64]
-    ended: npt.NDArray[np.bool_]
-    energy_before: Array
-    energy_after: Array
-    largest_elastic_energy: Array
-    works: Works
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """The energy of one run, booked.
-
-    steps_done: fewer than `steps` where the numbers left the range of doubles; the books end there. run: works of all
-    steps; flights: of the steps that begin and end with every node above the ground. bounces: rows of the first
-    LARGEST of bounce_count. launch_energy, end_energy [J]: with the velocity at the stored place.
-    """
-
-    scene: Scene
-    model: str
-    scheme: str
-    steps: int
-    steps_done: int
-    launch_energy: float
-    end_energy: float
-    run: Works
-    flights: Works
-    bounces: Bounces
-    bounce_count: int
-
-
-def keep(
+def ledger(
     scene: Scene,
     *,
     model: str = "tumbling",
     scheme: str = "symplectic_euler",
     steps: int = 10_000,
     budget: int | None = None,
-) -> Ledger:
-    """Run the scene's own launch step by step and return the ledger of its energy.
+) -> xr.Dataset:
+    """Run the scene's own launch step by step and return where its energy went, as variables of a run's file.
+
+    Scalars: `launch_energy` and `end_energy` [J], of the velocity at the stored place; `bounce_count`; the AMOUNTS and
+    `scheme_work`, the sum of the three defects, in the run and, as `flight_...`, in the steps that begin and end with
+    every node above the ground. `bounce_...`, dimension `bounce`: the same for the first LARGEST bounces. The attribute
+    `steps_done` is less than `steps` where the numbers left the range of doubles; the ledger ends there.
 
     model: `auto` takes the least that is exact for the scene. budget: steps at most; None does all. Raises InputError
     for an unknown name, a step count out of range, and a model that the scene or the scheme does not allow.
     """
     validation.choice("scheme", scheme, BOOKED)
-    steps = validation.count("steps", steps)
-    model, _ = model_selection.chosen(model, [scene], scene.duration / steps)
-    schemes.check_fit(scheme, scene, model)
-    physics = physics_of(scene)
-    accounts = np.zeros(3, _ACCOUNT)
-    rows = np.zeros(min(LARGEST, steps), _ROW)
-    tags = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
-    h, lag, stand = scene.duration / steps, schemes.LAGS[scheme], np.zeros(1, _STAND)
-    state, views = start_of(scene, model), np.zeros(2, _VIEW)
-    numbers = *tags, physics, physics._replace(node_weight=0.0)
-    launch_energy = _begin(*numbers[2:], state, lag * h, views)
-    end = steps if budget is None else budget
-    while _keep(*numbers, state, end, h, lag, stand, views, accounts, rows):
+    setup = backend.setup_of(scene, model, backend.OURS, scheme, steps)
+    physics, state, h, lag = physics_of(scene), start_of(scene, setup.model), setup.step_size, setup.lag
+    ground = LAWS[scene.ground.contact], physics, physics._replace(node_weight=0.0)
+    accounts, rows = np.zeros(3, _ACCOUNT), np.zeros(min(LARGEST, setup.steps), _ROW)
+    views, stand = np.zeros(2, _VIEW), np.zeros(1, _STAND)
+    _begin(*ground, state, lag * h, views, stand)
+    end = setup.steps if budget is None else budget
+    tags = schemes.SCHEMES[scheme], MODELS[setup.model]
+    while _advance(*tags, *ground, state, end, h, lag, stand, views, accounts, rows):
         pass
-    steps_done, bounce_count = int(stand["done"][0]), int(stand["bounces"][0])
-    end_energy = _energy_of(views, steps_done)
-    rows, booked = rows[:bounce_count], accounts["total"] + accounts["rest"]
-    return Ledger(
-        scene,
-        model,
-        scheme,
-        steps,
-        steps_done,
-        launch_energy,
-        end_energy,
-        Works(*booked[_RUN]),
-        Works(*booked[_FLIGHTS]),
-        Bounces(
-            first_step=rows["first_step"],
-            last_step=rows["last_step"],
-            ended=rows["ended"],
-            energy_before=rows["energy_before"],
-            energy_after=rows["energy_after"],
-            largest_elastic_energy=rows["largest_elastic_energy"],
-            works=Works(*rows["booked"].T),
-        ),
-        bounce_count,
-    )
+    return _dataset(setup, stand[0], rows[: stand["bounces"][0]], accounts["total"] + accounts["rest"])
 
 
 @njit(cache=True)
-def _begin(law: Any, physics: Physics, weightless: Physics, states: States, late: float, views: Any) -> float:
-    """View the launch, and return its energy [J]."""
+def _begin(
+    law: Any, physics: Physics, weightless: Physics, states: States, late: float, views: Any, stand: Any
+) -> None:
+    """View the launch."""
     _look(law, physics, weightless, states[0], late, views[0])
-    return _energy(views[0])
+    stand[0].launch_energy = stand[0].energy = _energy(views[0])
 
 
 @njit(cache=True)
-def _energy_of(views: Any, step: int) -> float:
-    """Return the energy after a step, the last or the one before [J]."""
-    return _energy(views[step % 2])
-
-
-@njit(cache=True)
-def _keep(
+def _advance(
     scheme: Any,
     model: Any,
     law: Any,
@@ -262,13 +184,15 @@ def _keep(
         if not _size(booked) < LARGEST_WORK:
             return False
         stand.done = i
+        stand.energy = _energy(after)
         _add(accounts[_RUN], booked)
         if before.clearance > 0.0 and after.clearance > 0.0:
             _add(accounts[_FLIGHTS], booked)
             continue
         if not stand.in_bounce:
             stand.in_bounce = True
-            _open(accounts[_BOUNCE])
+            accounts[_BOUNCE].total[:] = 0.0
+            accounts[_BOUNCE].rest[:] = 0.0
             if stand.bounces < rows.shape[0]:
                 row = rows[stand.bounces]
                 row.first_step = i - 1
@@ -394,14 +318,6 @@ def _add(account: Any, booked: Any) -> None:
 
 
 @njit
-def _open(account: Any) -> None:
-    """Begin an account anew."""
-    for k in range(account.total.shape[0]):
-        account.total[k] = 0.0
-        account.rest[k] = 0.0
-
-
-@njit
 def _write(row: Any, account: Any, step: int, view: Any) -> None:
     """Bring a bounce's row up to a step."""
     row.last_step = step
@@ -412,45 +328,44 @@ def _write(row: Any, account: Any, step: int, view: Any) -> None:
         row.booked[k] = account.total[k] + account.rest[k]
 
 
-def variables(ledger: Ledger) -> dict[str, Any]:
-    """Return the ledger as variables of a run's file, (dimensions, values, attributes) by name as in `dataset.py`.
-
-    The run's totals are scalars; rows of bounces, `bounce_...`, have the dimension `bounce`.
-    """
-    rows, place = ledger.bounces, "kinetic (of the velocity at the stored place), potential and elastic energy"
-    columns: dict[str, tuple[Any, str, str]] = {
-        "first_step": (rows.first_step, "last step with every node above the ground", "1"),
-        "last_step": (rows.last_step, "first step in the air again, or the last one booked", "1"),
-        "start": (_time(ledger, rows.first_step), "time of the bounce's first step", "s"),
-        "end": (_time(ledger, rows.last_step), "time of the bounce's last step", "s"),
-        "energy_before": (rows.energy_before, f"{place} at the bounce's first step", "J"),
-        "energy_after": (rows.energy_after, f"{place} at the bounce's last step", "J"),
-        "largest_elastic_energy": (rows.largest_elastic_energy, "most energy in the springs in the bounce", "J"),
-    }
-    columns |= {name: (values, f"{text}, in the bounce", "J") for name, values, text in _booked(rows.works)}
+def _dataset(setup: Setup, stand: Any, rows: npt.NDArray[np.void], booked: Array) -> xr.Dataset:
+    """Return the ledger of a run; booked: the AMOUNTS of the accounts, shape (account, amount)."""
+    place = "kinetic (of the velocity at the stored place), potential and elastic energy"
+    duration, first, last = setup.scene.duration, rows["first_step"], rows["last_step"]
     totals: dict[str, tuple[Any, str, str]] = {
-        "launch_energy": (ledger.launch_energy, f"{place} at the launch", "J"),
-        "end_energy": (ledger.end_energy, f"{place} at the last step booked", "J"),
-        "bounce_count": (ledger.bounce_count, "bounces, those without a row included", "1"),
+        "launch_energy": (stand["launch_energy"], f"{place} at the launch", "J"),
+        "end_energy": (stand["energy"], f"{place} at the last step booked", "J"),
+        "bounce_count": (stand["bounces"], "bounces, those without a row included", "1"),
+        **_works("", booked[_RUN], "the run"),
+        **_works("flight_", booked[_FLIGHTS], "flights"),
     }
-    totals |= {name: (values, f"{text}, in the run", "J") for name, values, text in _booked(ledger.run)}
-    totals |= {f"flight_{name}": (values, f"{text}, in flights", "J") for name, values, text in _booked(ledger.flights)}
+    columns: dict[str, tuple[Any, str, str]] = {
+        "bounce_first_step": (first, "last step with every node above the ground", "1"),
+        "bounce_last_step": (last, "first step in the air again, or the last one booked", "1"),
+        "bounce_start": (first / setup.steps * duration, "time of the bounce's first step", "s"),
+        "bounce_end": (last / setup.steps * duration, "time of the bounce's last step", "s"),
+        "bounce_energy_before": (rows["energy_before"], f"{place} at the bounce's first step", "J"),
+        "bounce_energy_after": (rows["energy_after"], f"{place} at the bounce's last step", "J"),
+        "bounce_largest_elastic_energy": (
+            rows["largest_elastic_energy"],
+            "most energy in the springs in the bounce",
+            "J",
+        ),
+        **_works("bounce_", rows["booked"], "the bounce"),
+    }
+    variables: dict[str, Any] = {
+        name: (dimensions, values, {"long_name": text, "units": unit})
+        for dimensions, described in (((), totals), (("bounce",), columns))
+        for name, (values, text, unit) in described.items()
+    }
     ended = enum_attributes("whether the bounce was over at the last step booked", ENDED)
-    return (
-        {name: ((), value, {"long_name": text, "units": unit}) for name, (value, text, unit) in totals.items()}
-        | {
-            f"bounce_{name}": ("bounce", values, {"long_name": text, "units": unit})
-            for name, (values, text, unit) in columns.items()
-        }
-        | {"bounce_ended": ("bounce", rows.ended.astype(np.int8), ended)}
-    )
+    variables["bounce_ended"] = ("bounce", rows["ended"].astype(np.int8), ended)
+    return xr.Dataset(variables, attrs={"steps_done": int(stand["done"])})
 
 
-def _time(ledger: Ledger, step: npt.NDArray[np.int64]) -> Array:
-    return step / ledger.steps * ledger.scene.duration
-
-
-def _booked(works: Works) -> list[tuple[str, Array, str]]:
-    """Return name, values and meaning of each amount, and of the scheme's work."""
-    amounts = [(name, getattr(works, name), text) for name, text in AMOUNTS.items()]
-    return [*amounts, ("scheme_work", works.scheme_work, "energy that the scheme made, the sum of its defects")]
+def _works(prefix: str, booked: Array, where: str) -> dict[str, tuple[Array, str, str]]:
+    """Return values, meaning and unit of each amount, shape (..., amount), and of the scheme's work."""
+    works = {name: (booked[..., k], text) for k, (name, text) in enumerate(AMOUNTS.items())}
+    made = booked[..., _SPRING_DEFECT] + booked[..., _GRAVITY_DEFECT] + booked[..., _KICK_DEFECT]
+    works["scheme_work"] = made, "energy that the scheme made, the sum of its defects"
+    return {prefix + name: (values, f"{text}, in {where}", "J") for name, (values, text) in works.items()}

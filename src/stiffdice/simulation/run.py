@@ -5,38 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.energy import energies, mechanical
-from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import STATE, Array, Ensemble, Physics, States, physics_of, start_of
+from stiffdice.dynamics.state import Array, Ensemble, Physics, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend, batch_loop, fast_forward, monitor
+from stiffdice.simulation.backend import Setup
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria.apex import default_hop_height
 from stiffdice.simulation.criteria.energy import ceiling, finish
 from stiffdice.simulation.criteria.registry import MEMORY, limits_of, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.criteria.registry import start as criteria_start
-from stiffdice.simulation.endings import endings_of
 from stiffdice.simulation.monitor import SIGHT
-from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.reference import none
+from stiffdice.simulation.task import Task, Watched, room_for
 
 # Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
 # of a second.
 _WORK = 200_000
-
-LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
 
 @dataclass(frozen=True)
@@ -137,159 +133,136 @@ def simulate(
     does so where no state is kept. members: the launches of an ensemble; None runs the scene's own launch. criteria
     [1]: tolerances of those that the verdict asks, by name; None asks the default ones. stop [1]: end a run as soon as
     all of these criteria are decided at these tolerances. references: what the criterion trajectory compares with, one
-    for all or one for each member (`reference.make`). hop_height [m]: rebounds that stay lower are not judged by the
-    criterion apex; None takes a tenth of the cube's radius. budget: most steps to compute one by one, or about the most
-    force evaluations of a scheme or an engine that takes its own steps; a run that needs more ends undecided; None is
-    all steps, or 10⁷ evaluations. progress: called with the fraction done, some times a second.
+    for all or one for each member (`reference_run.references`). hop_height [m]: rebounds that stay lower are not judged
+    by the criterion apex; None takes a tenth of the cube's radius. budget: most steps to compute one by one, or about
+    the most force evaluations of a scheme or an engine that takes its own steps; a run that needs more ends undecided;
+    None is all steps, or 10⁷ evaluations. progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
     engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.
     """
-    scheme = backend.scheme_of(simulator, scheme)
-    steps = validation.count("steps", steps)
     if model == model_selection.AUTO and members is not None:
         raise InputError("model = auto: is chosen for the scene's own launch; an ensemble needs the name of a model")
-    model, model_reason = model_selection.chosen(model, [scene], scene.duration / steps)
-    backend.check_fit(simulator, scheme, scene, model)
-    tolerance = _checked_tolerance(tolerance)
-    tolerances = tolerances_of(model, criteria)
-    hop = (
-        default_hop_height(scene)
-        if hop_height is None
-        else validation.number("hop_height", hop_height, "m", at_least=0)
-    )
-    own = Ensemble(start_of(scene, model), np.zeros(1))
-    launches, late = own if members is None else members
-    ensemble = launches.copy()
-    count = len(ensemble)
-    if every is not None:
-        every = validation.count("every", every, at_most=steps)
-        if count != 1:
-            raise InputError("every: a trajectory is kept of one run, not of an ensemble")
-    samples = _room_for(steps, every)
-    physics = physics_of(scene)
-    h = scene.duration / steps
-    most = backend.budget_of(simulator, scheme, steps) if budget is None else budget
-    watched = Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64))
-    watched.memory["limits"] = limits_of({} if stop is None else stop)
-    if every is not None:
-        samples[0] = ensemble[0]
-    lag = backend.lag_of(simulator, scheme)
-    tags = MODELS[model], LAWS[scene.ground.contact]
-    _begin(*tags, physics, ensemble, watched.memory, watched.sight, h, steps, late, lag, hop)
-    compared = none() if references is None else references
-
-    leaping = True if leap or (leap is None and every is None) else None
-
-    def advance() -> bool:
-        goes_on: bool = _march(
-            schemes.SCHEMES[scheme],
-            *tags,
-            physics,
-            ensemble,
-            *watched,
-            compared,
-            steps,
-            h,
-            tolerance,
-            most,
-            every or 0,
-            leaping,
-            samples,
-        )
-        return goes_on
-
-    if simulator != backend.OURS:
-        limits = steps, h, tolerance, most, every or 0
-        backend.driving().march(
-            simulator, scene, model, physics, ensemble, watched, compared, *limits, samples, progress
-        )
-    else:
-        alone = every is not None or progress is not None or budget is not None or references is not None
-        left = count
-        grounded = bool(watched.sight["touched"].any())
-        if leaping and not (alone or grounded) and batch_loop.pays(scene, model, scheme, ensemble):
-            left = batch_loop.march(scene, model, physics, ensemble, watched, steps)
-        if left > 0:
-            _repeat(advance, None if progress is None else lambda: progress(watched.fraction(steps, h)))
-
-    _finish(physics, ensemble, watched.memory, watched.sight)
-    found = values(watched.memory)
-    spent = (watched.steps_done < steps) & (watched.spent >= most)
-    method = scheme if simulator == backend.OURS else None
-    endings = endings_of(scene, model, method, steps, launches, ensemble, watched.memory, watched.sight)
-    ended = judge.ending(found, endings | {Verdict.UNDECIDED: spent})
-    return Run(
-        scene,
-        model,
-        model_reason,
-        simulator,
-        backend.version_of(simulator),
-        scheme,
-        steps,
-        tolerance,
-        tolerances,
-        hop,
-        found,
-        watched.sight["touchdown_phase"].copy(),
-        watched.steps_done,
-        watched.memory["decided"].copy(),
-        watched.steps_computed,
-        watched.evaluations,
-        ended,
-        judge.judge(tolerances, found, ended),
-        ensemble,
-        None
-        if every is None
-        else _trajectory(scene, model, simulator, lag, physics, samples, every, steps, int(watched.steps_done[0])),
-    )
+    setup = backend.setup_of(scene, model, simulator, scheme, steps)
+    tolerances = tolerances_of(setup.model, criteria)
+    task = _task(setup, tolerance, every, members, stop, references, hop_height, budget)
+    leaping = leap or (leap is None and every is None)
+    together = leaping and every is None and progress is None and budget is None and references is None
+    _advance(task, leaping, together, progress)
+    return _judged(task, tolerances)
 
 
-def _checked_tolerance(tolerance: float) -> float:
+def _task(
+    setup: Setup,
+    tolerance: float,
+    every: int | None,
+    members: Ensemble | None,
+    stop: Mapping[str, float] | None,
+    references: npt.NDArray[np.void] | None,
+    hop_height: float | None,
+    budget: int | None,
+) -> Task:
+    """Return what `simulate` was asked, checked, every member watched and at its launch."""
     number = validation.number("tolerance", tolerance, "1", above=0)
     if not schemes.FINEST <= number <= schemes.COARSEST:
         raise InputError(f"tolerance = {number:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}")
-    return number
+    if hop_height is None:
+        hop_height = default_hop_height(setup.scene)
+    launches, late = members or Ensemble(start_of(setup.scene, setup.model), np.zeros(1))
+    count = len(launches)
+    if every is not None:
+        every = validation.count("every", every, at_most=setup.steps)
+        if count != 1:
+            raise InputError("every: a trajectory is kept of one run, not of an ensemble")
+    task = Task(
+        setup,
+        number,
+        setup.budget if budget is None else budget,
+        every or 0,
+        validation.number("hop_height", hop_height, "m", at_least=0),
+        launches,
+        launches.copy(),
+        Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64)),
+        none() if references is None else references,
+        room_for(setup.steps, every),
+    )
+    memory, sight = task.watched[:2]
+    memory["limits"] = limits_of(stop or {})
+    task.samples[:1] = launches[:1]
+    h, lag = setup.step_size, setup.lag
+    _begin(*task.tags, task.physics, task.ensemble, memory, sight, h, setup.steps, late, lag, task.hop_height)
+    return task
 
 
-def _repeat(advance: Callable[[], bool], tell: Callable[[], None] | None) -> None:
-    """Advance as long as there is more to do; here, between two calls of compiled code, Python sees signals."""
+def _advance(task: Task, leaping: bool, together: bool, progress: Callable[[float], None] | None) -> None:
+    """Advance every member to its end.
+
+    leaping: take motion that is known at once. together: step members side by side where that pays.
+    """
+    setup, watched, physics = task.setup, task.watched, task.physics
+    scene, model, steps = setup.scene, setup.model, setup.steps
+    if setup.simulator != backend.OURS:
+        backend.driver().march(task, progress)
+        return
+    together = together and not watched.sight["touched"].any()
     goes_on = True
-    while goes_on:
-        goes_on = advance()
-        if tell is not None:
-            tell()
-
-
-class Watched(NamedTuple):
-    """What a kernel keeps of each member besides its state; first dimension member."""
-
-    memory: npt.NDArray[np.void]
-    sight: npt.NDArray[np.void]
-    steps_done: npt.NDArray[np.int64]
-    steps_computed: npt.NDArray[np.int64]
-    evaluations: npt.NDArray[np.int64]
-
-    @property
-    def spent(self) -> Array:
-        """What each member has taken of its budget: steps computed, or the work of a scheme that takes its own."""
-        return np.maximum(self.steps_computed, self.sight["work"])
-
-    def fraction(self, steps: int, h: float) -> float:
-        """Return the part done of a run of so many steps of h [s], the mean over the members."""
-        pending = self.sight["pending"]
-        begun = np.where(pending > 0, 1 - pending / h, 0.0)
-        return float(np.mean((self.steps_done + begun) / steps))
-
-
-def _room_for(steps: int, every: int | None) -> States:
-    count = 0 if every is None else steps // every + 1
-    if count > LARGEST_TRAJECTORY:
-        raise InputError(
-            f"every = {every}: would keep {count} samples ({count * STATE.itemsize / 1e9:.1f} GB); "
-            f"allowed is {math.ceil(steps / LARGEST_TRAJECTORY)} or more"
+    if together and batch_loop.pays(scene, model, setup.scheme, task.ensemble):
+        goes_on = batch_loop.march(scene, model, physics, task.ensemble, watched, steps) > 0
+    while goes_on:  # between two calls of compiled code, Python sees signals
+        goes_on = _march(
+            schemes.SCHEMES[setup.scheme],
+            *task.tags,
+            physics,
+            task.ensemble,
+            *watched,
+            task.references,
+            steps,
+            setup.step_size,
+            task.tolerance,
+            task.budget,
+            task.every,
+            True if leaping else None,
+            task.samples,
         )
-    return np.zeros(count, STATE)
+        if progress is not None:
+            progress(watched.fraction(steps, setup.step_size))
+
+
+def _judged(task: Task, tolerances: dict[str, float]) -> Run:
+    """Return the run that is over, with its verdicts."""
+    setup, watched = task.setup, task.watched
+    _finish(task.physics, task.ensemble, watched.memory, watched.sight)
+    measures = values(watched.memory)
+    ended = judge.ending(measures, judge.endings_of(task))
+    return Run(
+        **setup._asdict(),
+        simulator_version=setup.version,
+        tolerance=task.tolerance,
+        tolerances=tolerances,
+        hop_height=task.hop_height,
+        measures=measures,
+        touchdown_phase=watched.sight["touchdown_phase"].copy(),
+        steps_done=watched.steps_done,
+        decided=watched.memory["decided"].copy(),
+        steps_computed=watched.steps_computed,
+        evaluations=watched.evaluations,
+        ending=ended,
+        verdict=judge.judge(tolerances, measures, ended),
+        end=task.ensemble,
+        trajectory=_trajectory(task) if task.every else None,
+    )
+
+
+def _trajectory(task: Task) -> Trajectory:
+    setup, physics = task.setup, task.physics
+    state = task.samples[: int(task.watched.steps_done[0]) // task.every + 1]
+    step = np.arange(len(state), dtype=np.int64) * task.every
+    whole = None
+    if setup.simulator == backend.OURS:
+        whole = mechanical(*task.tags, physics, state, setup.lag * setup.step_size)
+    time = step / setup.steps * setup.scene.duration
+    kinetic, potential, elastic = energies(physics, state)
+    return Trajectory(step, time, state, kinetic, potential, elastic, whole)
 
 
 @njit(cache=True)
@@ -432,24 +405,3 @@ def _leap(
     high, low = ceiling(remembered.energy), fast_forward.rest_of(model, law, physics, seen)
     taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
     return skipped + taken, 0, computed, evaluated
-
-
-def _trajectory(
-    scene: Scene,
-    model: str,
-    simulator: str,
-    lag: float,
-    physics: Physics,
-    samples: States,
-    every: int,
-    steps: int,
-    steps_done: int,
-) -> Trajectory:
-    state = samples[: steps_done // every + 1]
-    step = np.arange(len(state), dtype=np.int64) * every
-    whole = None
-    if simulator == backend.OURS:
-        behind = lag * scene.duration / steps
-        whole = mechanical(MODELS[model], LAWS[scene.ground.contact], physics, state, behind)
-    kinetic, potential, elastic = energies(physics, state)
-    return Trajectory(step, step / steps * scene.duration, state, kinetic, potential, elastic, whole)

@@ -29,10 +29,10 @@ def made(scene, *, steps=2000, **options):
     run = simulate(from_mapping(scene), steps=steps, **options)
     found = run_dataset(run)
     if run.scheme in energy_budget.BOOKED:
-        books = energy_budget.keep(
+        ledger = energy_budget.ledger(
             run.scene, model=run.model, scheme=run.scheme, steps=steps, budget=int(run.steps_done[0])
         )
-        found = found.assign(energy_budget.variables(books))
+        found = found.assign(ledger.data_vars)
     return found
 
 

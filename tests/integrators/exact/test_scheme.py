@@ -327,7 +327,7 @@ def test_energy_is_lost_to_damping_drag_and_friction_alone(contact):
     """The works that the ledger adds up along the exact path are its loss of energy, but for steps of a touch-down."""
     scene = scene_of(contact, 1e3, 0.2, 0.1, duration=4.0, orientation=TILTED)
     for steps in (10_000, 100_000):
-        run = energy_budget.keep(scene, model="sliding", scheme="exact", steps=steps).run
+        run = energy_budget.ledger(scene, model="sliding", scheme="exact", steps=steps)
         assert run.damping_work + run.drag_work + run.friction_work < -10
         assert abs(run.scheme_work) < 40 * 4.0 / steps
 
@@ -502,7 +502,7 @@ def test_round_off_takes_no_pieces():
 )
 def test_it_says_what_it_is_not_for(changes, model, told):
     scene = scene_of(**changes)
-    for refuse in (simulate, energy_budget.keep):
+    for refuse in (simulate, energy_budget.ledger):
         with pytest.raises(InputError, match=told):
             refuse(scene, model=model, scheme="exact", steps=10)
     assert schemes.unfit("exact", scene, model)

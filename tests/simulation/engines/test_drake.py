@@ -42,7 +42,7 @@ def flat(height, velocity=(0.0, 0.0, 0.0), gravity=9.8, **ground):
 
 def run(scene, model, h, samples, every=1):
     states = np.zeros(samples, STATE)
-    assert drake.start(scene, model, start_of(scene, model), h, 1e-9).advance(states, every) == samples * every
+    assert drake.Drake(scene, model, start_of(scene, model), h, 1e-9).advance(states, every) == samples * every
     return states
 
 
@@ -101,7 +101,7 @@ def test_free_flight_is_that_of_symplectic_euler(model, lower):
     launch = start_of(scene, model)
     launch["position"][:, 2] -= lower
     states = np.zeros(9, STATE)
-    drake.start(scene, model, launch, 0.01, 1e-9).advance(states, 10)
+    drake.Drake(scene, model, launch, 0.01, 1e-9).advance(states, 10)
     for name in ("position", "velocity", "angular_momentum", "angular_velocity"):
         np.testing.assert_allclose(states[name], ours[name], rtol=0, atol=1e-12)
     turned = 0.01 * np.linalg.norm(ours["angular_velocity"][0])
@@ -168,7 +168,7 @@ def test_what_a_model_leaves_out_stays_as_launched():
 def test_a_run_goes_on_where_it_stood_and_may_be_sampled_at_will():
     scene = from_mapping(THROW, "as_written")
     each = run(scene, "tumbling", 1e-3, 1700)
-    engine = drake.start(scene, "tumbling", start_of(scene, "tumbling"), 1e-3, 1e-9)
+    engine = drake.Drake(scene, "tumbling", start_of(scene, "tumbling"), 1e-3, 1e-9)
     for begin in (0, 600):
         states = np.zeros(600 // 50, STATE)
         engine.advance(states, 50)
@@ -178,7 +178,7 @@ def test_a_run_goes_on_where_it_stood_and_may_be_sampled_at_will():
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
 def test_what_fails_is_not_a_number_for_good_and_says_nothing(model, capfd):
     scene = from_mapping({"ground": {"stiffness": 1e8}}, "as_written")
-    engine = drake.start(scene, model, start_of(scene, model), 1e3, 1e-9)
+    engine = drake.Drake(scene, model, start_of(scene, model), 1e3, 1e-9)
     states = np.zeros(4, STATE)
     for _ in range(2):
         assert engine.advance(states, 2) == 0
@@ -193,7 +193,7 @@ def test_drake_warns_of_nothing_in_a_process_of_its_own():
     code = (
         "from stiffdice.simulation.engines import drake; from stiffdice.scene.scene import Scene; "
         "from stiffdice.dynamics.state import start_of; "
-        "drake.start(Scene(), 'sliding', start_of(Scene(), 'sliding'), 1e-3, 1e-9)"
+        "drake.Drake(Scene(), 'sliding', start_of(Scene(), 'sliding'), 1e-3, 1e-9)"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
@@ -216,9 +216,9 @@ def test_drake_warns_of_nothing_in_a_process_of_its_own():
     ],
 )
 def test_what_drake_cannot_represent_is_said_in_one_sentence(changes, model, why):
-    told = drake.unfit(from_mapping(changes, "as_written"), model)
+    told = drake.Drake.unfit(from_mapping(changes, "as_written"), model)
     assert told is None if why is None else told.startswith(why)
 
 
 def test_the_version_is_told():
-    assert drake.versions().startswith("drake 1.")
+    assert drake.Drake.version().startswith("drake 1.")

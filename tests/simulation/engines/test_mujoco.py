@@ -9,7 +9,6 @@ from stiffdice.dynamics.flat_bounce import restitution
 from stiffdice.dynamics.linear_theory import sag
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines.compatibility import gated_rigid
 from stiffdice.simulation.run import simulate
 
 pytest.importorskip("mujoco")
@@ -30,7 +29,7 @@ def scene_of(ground, launch=(), duration=1.0):
 
 
 def run(scene, model, steps, every=1):
-    engine = mujoco.start(scene, model, start_of(scene, model), scene.duration / steps, 1e-9)
+    engine = mujoco.Mujoco(scene, model, start_of(scene, model), scene.duration / steps, 1e-9)
     states = np.zeros(steps // every, STATE)
     assert engine.advance(states, every) == steps
     return states
@@ -65,7 +64,7 @@ def test_each_node_is_a_spring_of_its_own(orientation, nodes, stiffness):
     depth = scene.cube.mass * scene.gravity / (nodes * stiffness)
     launch["position"][:, 2] = -launch["node_offset"][..., 2].min() - depth
     states = np.zeros(200, STATE)
-    mujoco.start(scene, "vertical", launch, 0.05 / math.sqrt(stiffness), 1e-9).advance(states, 10)
+    mujoco.Mujoco(scene, "vertical", launch, 0.05 / math.sqrt(stiffness), 1e-9).advance(states, 10)
     assert np.abs(states["position"][:, 2] - launch["position"][0, 2]).max() < 1e-6 * depth + 1e-15
 
 
@@ -96,7 +95,7 @@ def test_friction_stops_a_sliding_cube_and_holds_it(model, damping):
     launch = start_of(scene, model)
     launch["position"][:, 2] = scene.cube.side / 2 - sag(scene)
     states = np.zeros(1000, STATE)
-    mujoco.start(scene, model, launch, 1e-4, 1e-9).advance(states, 10)
+    mujoco.Mujoco(scene, model, launch, 1e-4, 1e-9).advance(states, 10)
     far = states["position"][-1, :2]
     assert np.hypot(*far) == pytest.approx(1 / (2 * 0.3 * scene.gravity), rel=2e-3)
     assert far[1] / far[0] == pytest.approx(0.75, rel=2e-3)
@@ -113,7 +112,7 @@ def test_on_a_slope_a_cube_slides_only_beyond_the_coefficient(friction, slides):
     depth = scene.gravity * normal[2] / (2 * scene.ground.stiffness)  # the two lower ones carry it
     launch["position"] = normal * (-lowest - depth)
     states = np.zeros(100, STATE)
-    mujoco.start(scene, "sliding", launch, 1e-4, 1e-9).advance(states, 100)
+    mujoco.Mujoco(scene, "sliding", launch, 1e-4, 1e-9).advance(states, 100)
     speed = -states["velocity"][-1, 0] / normal[2]
     assert speed == pytest.approx(slides * scene.gravity * normal[2], abs=1e-4)
 
@@ -125,7 +124,7 @@ def test_friction_acts_half_way_up_to_the_surface():
     node = launch["node_offset"][0, launch["node_offset"][0, :, 2].argmin()]
     launch["position"][:, 2] = -node[2] - depth
     states = np.zeros(1, STATE)
-    mujoco.start(scene, "tumbling", launch, h, 1e-9).advance(states, 1)
+    mujoco.Mujoco(scene, "tumbling", launch, h, 1e-9).advance(states, 1)
     push = 1e4 * depth
     force = np.array([-0.1 * push * 2 / math.sqrt(5), -0.1 * push / math.sqrt(5), push])
     felt = (states["velocity"] - launch["velocity"])[0] / h + [0, 0, scene.gravity]
@@ -155,7 +154,7 @@ def test_how_often_states_are_asked_for_does_not_change_them():
     every_one = run(scene, "tumbling", 4200)
     assert np.array_equal(run(scene, "tumbling", 4200, 7), every_one[6::7])
     assert np.array_equal(run(scene, "tumbling", 4200, 2100), every_one[2099::2100])
-    engine = mujoco.start(scene, "tumbling", start_of(scene, "tumbling"), scene.duration / 4200, 1e-9)
+    engine = mujoco.Mujoco(scene, "tumbling", start_of(scene, "tumbling"), scene.duration / 4200, 1e-9)
     first, second = np.zeros(3, STATE), np.zeros(2, STATE)
     engine.advance(first, 1000)
     engine.advance(second, 600)
@@ -190,12 +189,12 @@ def test_beyond_the_stability_limit_a_cube_is_thrown_up_and_the_run_goes_on():
 )
 def test_it_says_what_it_cannot_represent(ground, launch, named):
     scene = scene_of(ground, launch)
-    why = mujoco.unfit(scene, "tumbling")
+    why = mujoco.Mujoco.unfit(scene, "tumbling")
     assert (why is None) == (named is None)
     assert named is None or named in why
-    assert mujoco.unfit(scene, "flying") is None
-    assert why == gated_rigid("MuJoCo", scene, "tumbling")
+    assert mujoco.Mujoco.unfit(scene, "flying") is None
+    assert why is None or "MuJoCo's " in why
 
 
 def test_the_version_is_told():
-    assert mujoco.versions().startswith("mujoco ")
+    assert mujoco.Mujoco.version().startswith("mujoco ")

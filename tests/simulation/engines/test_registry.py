@@ -62,7 +62,7 @@ def test_two_transcriptions_are_one_model(model, preset):
     found = []
     for engine in ("numpy", "octave"):
         found.append(np.zeros(300, STATE))
-        adapter_of(engine).start(scene, model, start_of(scene, model), 1e-3, 1e-9).advance(found[-1], 5)
+        adapter_of(engine)(scene, model, start_of(scene, model), 1e-3, 1e-9).advance(found[-1], 5)
     for name in STATE.names:
         np.testing.assert_allclose(found[0][name], found[1][name], rtol=0, atol=1e-12, err_msg=name)
 
@@ -72,13 +72,13 @@ def test_kept_states_are_those_of_single_steps_however_they_are_asked_for(engine
     scene = from_mapping(TILTED, "as_listed")
     launch, adapter = start_of(scene, "tumbling"), adapter_of(engine)
     single, parted, kept = np.zeros(60, STATE), np.zeros(60, STATE), np.zeros(4, STATE)
-    adapter.start(scene, "tumbling", launch, 1e-2, 1e-9).advance(single, 1)
-    run = adapter.start(scene, "tumbling", launch, 1e-2, 1e-9)
+    adapter(scene, "tumbling", launch, 1e-2, 1e-9).advance(single, 1)
+    run = adapter(scene, "tumbling", launch, 1e-2, 1e-9)
     run.advance(parted[:7], 1)
     run.advance(parted[7:], 1)
     assert parted.tobytes() == single.tobytes()
-    monkeypatch.setattr(adapter, "_BATCH", 4, raising=False)
-    assert adapter.start(scene, "tumbling", launch, 1e-2, 1e-9).advance(kept, 15) == 60
+    monkeypatch.setattr(adapter, "BATCH", 4, raising=False)
+    assert adapter(scene, "tumbling", launch, 1e-2, 1e-9).advance(kept, 15) == 60
     assert kept.tobytes() == single[14::15].tobytes()
 
 
@@ -125,11 +125,12 @@ def test_a_run_past_its_budget_is_undecided():
 
 
 @pytest.mark.parametrize("engine", [*TRANSCRIPTIONS, "scipy"])
-def test_a_run_that_fails_is_a_result(engine):
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+def test_a_run_that_fails_is_a_result(engine, model):
     """What leaves the range of doubles, or makes LSODA give up, ends with a verdict."""
     scene = from_mapping({"cube": {"mass": 1e-9}, "ground": {"stiffness": 1e308}}, "as_written")
-    run = simulate(scene, model="sliding", simulator=engine, steps=60)
-    ours = simulate(scene, model="sliding", steps=60)
+    run = simulate(scene, model=model, simulator=engine, steps=60)
+    ours = simulate(scene, model=model, steps=60)
     assert ours.verdict == [Verdict.LEFT_NUMERIC_RANGE]
     assert run.verdict == ours.verdict
     assert run.steps_done <= 60
@@ -188,11 +189,12 @@ def test_an_engine_that_is_broken_says_how(monkeypatch):
 
 @octave
 def test_octaves_own_words_are_told_and_the_next_run_has_another():
-    adapter = adapter_of("octave")
-    process = adapter._process()
+    from stiffdice.simulation.engines import octave as module
+
+    process = module._process()
     with pytest.raises(StiffdiceError, match=r"Octave gave up: .*out of memory"):
         process.answer(np.array([1e18, *np.zeros(52)]), 8)
-    assert adapter._process() is not process
+    assert module._process() is not process
     assert simulate(from_mapping({}), model="sliding", simulator="octave", steps=5).steps_done == [5]
 
 
@@ -215,8 +217,9 @@ def test_octave_ends_with_who_asked_it(end):
 
 @octave
 def test_an_octave_that_is_terminated_leaves_no_file_behind(tmp_path):
-    adapter = adapter_of("octave")
-    command = [adapter.PROGRAM, "--quiet", "--norc", "--no-history", str(adapter.SCRIPT)]
+    from stiffdice.simulation.engines.octave import PROGRAM, SCRIPT
+
+    command = [PROGRAM, "--quiet", "--norc", "--no-history", str(SCRIPT)]
     with subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL) as waiting:
         time.sleep(1)
         waiting.terminate()

@@ -46,7 +46,7 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     """Return where the cube is, dimensions method, effort, time, axis, and its distance from the reference.
 
     methods: names of schemes and engines; one that cannot represent the scene is left out, and `unfit` says why.
-    steps: of the simplest scheme at the most; of another so many less as its steps take longer (`stepper.DEARER`),
+    steps: of the simplest scheme at the most; of another so many less as its steps take longer (`Peer.dearness`),
     so that each is given about the same time. samples: equal parts of the duration; a state is stored after each.
     `reference_error` is how far the reference is from the same at a thousand times its tolerance.
 

@@ -19,12 +19,6 @@ SLOTS = 1  # the measure
 
 
 @njit
-def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
-    """Begin to watch a run that stands at its launch."""
-    slots[0] = 0.0
-
-
-@njit
 def observe(
     slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
 ) -> tuple[float, bool]:

@@ -7,8 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from stiffdice.dynamics.rotation import along
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States
+from stiffdice.integrators import linear_stability
+from stiffdice.integrators import registry as schemes
+from stiffdice.scene.scene import Scene
 from stiffdice.simulation.criteria.registry import CRITERIA, holds
 from stiffdice.simulation.outcome import BLOW_UP, Verdict, gravest
+from stiffdice.simulation.task import Task
+
+Flags = npt.NDArray[np.bool_]
 
 
 def ending(measures: Mapping[str, npt.ArrayLike], endings: Mapping[Verdict, npt.ArrayLike]) -> npt.NDArray[np.int8]:
@@ -21,9 +29,7 @@ def ending(measures: Mapping[str, npt.ArrayLike], endings: Mapping[Verdict, npt.
     return gravest({**endings, Verdict.BLEW_UP: ratio > BLOW_UP, Verdict.LEFT_NUMERIC_RANGE: out_of_range})
 
 
-def passes(
-    tolerances: Mapping[str, float], measures: Mapping[str, npt.ArrayLike], endings: npt.ArrayLike
-) -> npt.NDArray[np.bool_]:
+def passes(tolerances: Mapping[str, float], measures: Mapping[str, npt.ArrayLike], endings: npt.ArrayLike) -> Flags:
     """Return whether each criterion asked holds of a run that ended well, shape (criterion, ...).
 
     tolerances: of the criteria asked. measures: values by name. endings: as `ending` returns them.
@@ -42,10 +48,64 @@ def judge(
     It is PASSED where `passes` says so of every criterion asked. Arguments as there.
     """
     ended = np.asarray(endings)
-    applies: dict[Verdict, npt.NDArray[np.bool_]] = {
-        verdict: ended == verdict for verdict in Verdict if verdict != Verdict.PASSED
-    }
+    applies: dict[Verdict, Flags] = {verdict: ended == verdict for verdict in Verdict if verdict != Verdict.PASSED}
     for name, tolerance in tolerances.items():
         fails = ~holds(name, measures[CRITERIA[name].MEASURE], tolerance)
         applies[CRITERIA[name].FAILURE] = applies[CRITERIA[name].FAILURE] | fails
     return gravest(applies)
+
+
+def endings_of(task: Task) -> dict[Verdict, Flags]:
+    """Return whether each run of a task that is over ended so, shape (member,), by the verdict that says it.
+
+    Those are the verdicts that the last state, the launch, the steps and the budget tell.
+    """
+    setup, watched = task.setup, task.watched
+    touched = watched.sight["touched"] > 0
+    return {
+        Verdict.UNRESOLVED: unresolved(
+            setup.scene, setup.model, setup.own_scheme, setup.steps, touched, task.launches, task.ensemble
+        ),
+        Verdict.SANK: sunk(task.physics, task.ensemble, watched.memory, watched.sight),
+        Verdict.STALLED: stalled(task.launches, setup.step_size),
+        Verdict.UNDECIDED: (watched.steps_done < setup.steps) & (watched.spent >= task.budget),
+    }
+
+
+def unresolved(
+    scene: Scene, model: str, scheme: str | None, steps: int, touched: Flags, launches: States, ends: States
+) -> Flags:
+    """Return whether steps were too long for what a run met, shape (member,).
+
+    That is: beyond the linear limit of a contact where it touched the ground, beyond that of the ungated law's drag
+    anywhere, or more than half a turn in a step, at the launch or at the end. scheme: None for an engine's own.
+    """
+    fewest = np.zeros(len(launches))
+    if scheme is not None:
+        contact, drag = linear_stability.fewest_steps(scene, model, scheme)
+        fewest = np.maximum(np.where(touched, contact, 0.0), drag)
+    if model in TURNING & TOUCHING and scheme not in schemes.OWN_STEPS:
+        for states in (launches, ends):
+            fewest = np.fmax(fewest, linear_stability.half_turn_steps(scene, states["angular_momentum"]))
+    return np.asarray(steps < fewest)
+
+
+def sunk(physics: Physics, ends: States, memory: npt.NDArray[np.void], sight: npt.NDArray[np.void]) -> Flags:
+    """Return whether every node ended below the ground, shape (member,), and not just in the middle of a bounce.
+
+    A bounce ends, if the cube rests with its upper nodes out, and is no deeper than the energy of the launch takes it.
+    """
+    normal = np.array([physics.nx, physics.ny, physics.nz])
+    with np.errstate(all="ignore"):  # a run that blew up has infinite heights
+        heights = along(ends["position"][:, None, :] + ends["node_offset"], normal)
+        fall = np.sqrt(memory["energy"][:, 2] / (2 * physics.stiffness))
+    sag = sight["sag"]
+    bounces = (sag < physics.side) & (-heights.min(axis=1) <= 2 * sag + fall)
+    return np.asarray((heights < 0).all(axis=1) & ~bounces)
+
+
+def stalled(launches: States, h: float) -> Flags:
+    """Return whether a step of h [s] at the speed of the launch is lost in round-off of the place, shape (member,)."""
+    place, speed = launches["position"], launches["velocity"]
+    with np.errstate(over="ignore"):  # launches may be anything
+        return np.asarray(((speed != 0) & (place + h * speed == place)).any(axis=1))

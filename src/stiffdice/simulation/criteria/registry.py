@@ -3,7 +3,7 @@
 A criterion watches a run step by step and keeps the worst it has seen, its measure; it holds while the measure is at
 most BASE + tolerance. It says with BY_DEFAULT whether it is asked where a study names none, with FOR_TURNING whether it
 means anything for a cube that turns, with FAILURE which verdict a run gets that breaks it, and with SLOTS how many
-numbers it has to remember, the measure first.
+numbers it has to remember, the measure first. They are zero at the launch unless it has a `start`.
 """
 
 from __future__ import annotations
@@ -86,15 +86,15 @@ def open_of(memory: Any) -> int:
     return undecided if limited > 0 else 1
 
 
+def _none(*arguments: Any) -> int:
+    """Stand for the criteria after the last one."""
+    return 0
+
+
 def _starting(names: list[str]) -> Any:
     """Return a compiled function that lets the criteria of these names begin to watch."""
     if not names:
-
-        @njit
-        def nothing(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
-            pass
-
-        return nothing
+        return njit(_none)
     name = names[0]
     this, others = CRITERIA[name].start, _starting(names[1:])
 
@@ -113,14 +113,7 @@ def _observing(names: list[str]) -> Any:
     nothing and leaves the kernel cacheable on disk.
     """
     if not names:
-
-        @njit
-        def nothing(
-            memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any
-        ) -> int:
-            return 0
-
-        return nothing
+        return njit(_none)
     name, k = names[0], list(CRITERIA).index(names[0])
     this, others = CRITERIA[name].observe, _observing(names[1:])
 
@@ -137,7 +130,7 @@ def _observing(names: list[str]) -> Any:
 
 
 # (memory, sight, model, law, physics, state): begin to watch a run that stands at its launch.
-start = _starting(list(CRITERIA))
+start = _starting([name for name, criterion in CRITERIA.items() if hasattr(criterion, "start")])
 
 # (memory, step, sight, model, law, physics, state, reference) -> how many of the criteria that have a limit this step
 # decides. A criterion is decided when it fails, or can fail no more.

@@ -21,7 +21,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -37,14 +36,9 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from stiffdice.dynamics.rotation import matrices, turned
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States
+from stiffdice.dynamics.state import TOUCHING, States
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines.compatibility import gated_rigid
-
-# In free flight a step is one of symplectic Euler.
-LAG = 0.5
-SCHEME = "sap"
+from stiffdice.simulation.engines.adapter import RigidBody
 
 # Of the spheres that stand for the nodes, in units of the cube's radius: the arm of friction is too long by it.
 _SPHERE = 1e-9
@@ -52,50 +46,34 @@ _SPHERE = 1e-9
 # How many times as stiff as the ground a sphere is: k₁k₂/(k₁ + k₂) is the ground's then, to the last bit.
 _RIGID = 2.0**60
 
-# The axes along which a model that does not turn the cube lets it go.
-_AXES = {"vertical": (2,), "sliding": (0, 1, 2)}
 
+class Drake(RigidBody):
+    """One run, standing where the last step left it. In free flight a step is one of symplectic Euler."""
 
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return in one sentence why Drake cannot represent a scene and model, or None if it can."""
-    if model in TOUCHING and scene.ground.stiffness == 0:
-        return "ground.stiffness = 0: allowed is a number above 0, as Drake's contact is none without a spring"
-    return gated_rigid("Drake", scene, model)
+    NAME = "Drake"
+    PACKAGE = "drake"
+    SCHEME = "sap"
 
+    @classmethod
+    def unfit(cls, scene: Scene, model: str) -> str | None:
+        """Return in one sentence why Drake cannot represent a scene and model, or None if it can."""
+        if model in TOUCHING and scene.ground.stiffness == 0:
+            return "ground.stiffness = 0: allowed is a number above 0, as Drake's contact is none without a spring"
+        return super().unfit(scene, model)
 
-def versions() -> str:
-    """Return the engine's name and version."""
-    return f"drake {version('drake')}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> DrakeEngine:
-    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
-    return DrakeEngine(scene, model, launch, h)
-
-
-class DrakeEngine:
-    """One run, standing where the last step left it."""
-
-    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
-        """Build Drake's model of the scene and set it to the launch, shape (1,)."""
-        self._turns, self._inertia = model in TURNING, scene.cube.moment_of_inertia
-        self._h, self._steps, self._failed = h, 0, False
-        (self._launch,) = launch.copy()
-        self._axes = list(_AXES.get(model, ()))
+    def __post_init__(self) -> None:
+        """Build Drake's model of the scene and set it to the launch."""
+        super().__post_init__()
+        self._steps, self._failed = 0, False
         with _silence():
             builder = DiagramBuilder()
-            self._plant, _ = AddMultibodyPlantSceneGraph(builder, h)
-            _build(self._plant, scene, self._launch, self._axes, touching=model in TOUCHING)
+            self._plant, _ = AddMultibodyPlantSceneGraph(builder, self.h)
+            _build(self._plant, self)
             self._simulator = Simulator(builder.Build())
             self._context = self._plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
-            self._plant.SetPositionsAndVelocities(self._context, self._start())
-
-    def _start(self) -> Array:
-        launch = self._launch
-        if self._turns:
-            spin = launch["angular_momentum"] / self._inertia
-            return np.concatenate([[1.0, 0.0, 0.0, 0.0], launch["position"], spin, launch["velocity"]])
-        return np.concatenate([launch["position"][self._axes], launch["velocity"][self._axes]])
+            place, velocity = self.start["position"][self.axes], self.start["velocity"][self.axes]
+            turn, spin = ([1.0, 0.0, 0.0, 0.0], self.spin) if self.turns else ([], [])
+            self._plant.SetPositionsAndVelocities(self._context, np.concatenate([turn, place, spin, velocity]))
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations.
@@ -109,7 +87,14 @@ class DrakeEngine:
                 if self._step(every):
                     row[:] = self._plant.GetPositionsAndVelocities(self._context)
                     evaluations += every
-        self._put(rows, states)
+        if self.turns:
+            turns = rows[:, :4]
+            with np.errstate(all="ignore"):  # a run that blew up
+                turns = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+                self.put(states, rows[:, 4:7], rows[:, 10:], turns, rows[:, 7:10])
+        else:
+            places, velocities = np.split(rows, 2, axis=1)
+            self.put(states, places, velocities)
         return evaluations
 
     def _step(self, count: int) -> bool:
@@ -117,22 +102,10 @@ class DrakeEngine:
         self._steps += count
         if not self._failed:
             try:  # up to half a step past the last one: round-off in the time can neither lose a step nor gain one
-                self._simulator.AdvanceTo((self._steps - 0.5) * self._h)
+                self._simulator.AdvanceTo((self._steps - 0.5) * self.h)
             except (RuntimeError, SystemExit):  # the latter is what a failed assertion of Drake's raises
                 self._failed = True
         return not self._failed
-
-    def _put(self, rows: Array, states: States) -> None:
-        """Make the states that Drake's positions and velocities, shape (K, state), stand for."""
-        states[:] = self._launch
-        if self._turns:
-            states["position"], states["velocity"] = rows[:, 4:7], rows[:, 10:13]
-            states["angular_velocity"] = rows[:, 7:10]
-            states["angular_momentum"] = self._inertia * rows[:, 7:10]
-            states["node_offset"] = _turned(self._launch["node_offset"], rows[:, :4])
-            return
-        count = len(self._axes)
-        states["position"][:, self._axes], states["velocity"][:, self._axes] = rows[:, :count], rows[:, count:]
 
 
 @contextmanager
@@ -150,7 +123,8 @@ def _nothing(record: logging.LogRecord) -> bool:
     return False
 
 
-def _build(plant: Any, scene: Scene, launch: Any, axes: list[int], touching: bool) -> None:
+def _build(plant: Any, run: Drake) -> None:
+    scene, axes = run.scene, [] if run.turns else run.axes
     plant.set_contact_model(ContactModel.kPoint)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.set_sap_near_rigid_threshold(0.0)
@@ -160,8 +134,8 @@ def _build(plant: Any, scene: Scene, launch: Any, axes: list[int], touching: boo
     inertia = SpatialInertia(scene.cube.mass, np.zeros(3), UnitInertia(gyration, gyration, gyration))
     cube = plant.AddRigidBody("cube", inertia)
     _hang(plant, cube, axes)
-    if touching:
-        _lay(plant, scene, cube, launch, axes)
+    if run.model in TOUCHING:
+        _lay(plant, scene, cube, run.start, axes)
     plant.Finalize()
 
 
@@ -194,9 +168,3 @@ def _material(stiffness: float, relaxation_time: float, friction: float) -> Any:
     AddContactMaterial(material, point_stiffness=stiffness, friction=CoulombFriction(friction, friction))
     material.AddProperty("material", "relaxation_time", relaxation_time)
     return material
-
-
-def _turned(offsets: Array, quaternions: Array) -> Array:
-    """Return offsets, shape (node, 3), turned by each of (K, 4) quaternions, whose length need not be one."""
-    with np.errstate(all="ignore"):  # a run that blew up
-        return turned(matrices(quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)), offsets)

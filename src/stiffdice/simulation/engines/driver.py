@@ -13,73 +13,37 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
-from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Physics, States
-from stiffdice.scene import validation
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation import monitor
-from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.criteria.registry import open_of
-from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.engines.registry import ENGINES, adapter_of, check_fit
+from stiffdice.simulation.task import Task
+
+__all__ = ["ENGINES", "adapter_of", "check_fit", "march"]  # what `backend.py` loads
 
 # Steps that an engine makes before anybody looks: few at first, as a run may be decided early, then ever more.
 _FIRST, _MOST = 256, 8192
 
 
-def adapter_of(simulator: str) -> Any:
-    """Return the adapter of an engine; raises InputError for one that is not known or not installed."""
-    validation.choice("simulator", simulator, (OURS, *engines.ENGINES))
-    return engines.adapter_of(simulator)
-
-
-def check_fit(simulator: str, scene: Scene, model: str) -> None:
-    """Raise InputError where an engine cannot represent a scene and model."""
-    engines.check_fit(simulator, scene, model)
-
-
-def own_steps(simulator: str) -> bool:
-    """Return whether an engine takes steps of its own between two states."""
-    return engines.ENGINES[simulator].own_steps
-
-
-def march(
-    simulator: str,
-    scene: Scene,
-    model: str,
-    physics: Physics,
-    ensemble: States,
-    watched: Any,
-    references: npt.NDArray[np.void],
-    steps: int,
-    h: float,
-    tolerance: float,
-    budget: int,
-    every: int,
-    samples: States,
-    progress: Callable[[float], None] | None,
-) -> None:
-    """Let an engine run every member, one after another, and leave all as `simulate` does with its own steps.
-
-    watched: `run.Watched`. budget: steps, or force evaluations of an engine that takes its own. every: keep every
-    K-th state in `samples`; 0 keeps none.
-    """
-    start, law, tag = adapter_of(simulator).start, LAWS[scene.ground.contact], MODELS[model]
-    own = own_steps(simulator)
-    count, most = len(ensemble), steps if own else min(steps, budget)
-    allowed = {"most": budget} if own else {}
+def march(task: Task, progress: Callable[[float], None] | None) -> None:
+    """Let an engine run every member, one after another, and leave all as `simulate` does with its own steps."""
+    setup, watched = task.setup, task.watched
+    engine_of, own = adapter_of(setup.simulator), ENGINES[setup.simulator].own_steps
+    count, most = len(task.ensemble), setup.steps if own else min(setup.steps, task.budget)
     for m in range(count):
-        engine = start(scene, model, ensemble[m : m + 1].copy(), h, tolerance, **allowed)
+        launch = task.launches[m : m + 1]
+        engine = engine_of(setup.scene, setup.model, launch, setup.step_size, task.tolerance, task.budget)
         asked, chunk, goes_on = 0, _FIRST, True
         while asked < most and goes_on:
             states = np.zeros(min(chunk, most - asked), STATE)
             watched.evaluations[m] += engine.advance(states, 1)
             asked += len(states)
-            if own and watched.evaluations[m] >= budget:
+            if own and watched.evaluations[m] >= task.budget:
                 states, goes_on = states[: _known(states)], False
                 watched.sight["work"][m] = watched.evaluations[m]
-            goes_on &= _look(tag, law, physics, states, ensemble, m, *watched[:4], references, every, samples)
+            seen = task.ensemble, m, *watched[:4], task.references, task.every, task.samples
+            goes_on &= _look(*task.tags, task.physics, states, *seen)
             chunk = min(_MOST, 2 * chunk)
             if progress is not None:
                 progress((m + watched.steps_done[m] / most) / count)

@@ -27,13 +27,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from stiffdice.dynamics.rotation import matrices, turned
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States
+from stiffdice.dynamics.rotation import matrices
+from stiffdice.dynamics.state import TOUCHING, Array, States
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines.compatibility import gated_rigid
-
-LAG = 0.5
-SCHEME = "symplectic_euler"
+from stiffdice.simulation.engines.adapter import RigidBody
 
 _IMPEDANCE = 1e-4  # mjMINIMP
 
@@ -50,9 +47,6 @@ _TOLERANCE, _ITERATIONS = 1e-14, 50
 # Steps after which it is looked whether the run has blown up: a step of not-a-numbers takes hundreds of times as long.
 _BATCH = 256
 
-# The axes along which a model that does not turn the cube lets it go.
-_AXES = {"vertical": [2], "sliding": [0, 1, 2]}
-
 # What a scene has not; and the reset of a run that blows up.
 _OFF = (
     "EQUALITY", "FRICTIONLOSS", "LIMIT", "SPRING", "DAMPER", "CLAMPCTRL", "FILTERPARENT", "ACTUATION", "SENSOR",
@@ -60,31 +54,24 @@ _OFF = (
 )  # fmt: skip
 
 
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return in one sentence why MuJoCo cannot represent a scene and model, or None if it can."""
-    return gated_rigid("MuJoCo", scene, model)
-
-
-def versions() -> str:
-    """Return the engine's name and version."""
-    return f"mujoco {mujoco.__version__}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> MujocoEngine:
-    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
-    return MujocoEngine(scene, model, launch, h)
-
-
-class MujocoEngine:
+class Mujoco(RigidBody):
     """One run, standing where the last step left it."""
 
-    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
-        """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        self._turns, self._axes = model in TURNING, _AXES.get(model, [0, 1, 2])
-        self._launch, self._inertia = launch[0].copy(), scene.cube.moment_of_inertia
-        self._model = _compiled(scene, model, self._launch["node_offset"], h)
+    NAME = "MuJoCo"
+    PACKAGE = "mujoco"
+
+    def __post_init__(self) -> None:
+        """Put the cube where it is launched; its own axes are the world's then, the nodes being as launched."""
+        super().__post_init__()
+        self._model = _compiled(self)
         self._data, self._unseen = mujoco.MjData(self._model), _BATCH
-        self._place()
+        count = len(self.axes)
+        self._data.qpos[:count], self._data.qvel[:count] = (
+            self.start["position"][self.axes],
+            self.start["velocity"][self.axes],
+        )
+        if self.turns:
+            self._data.qvel[3:] = self.spin
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
@@ -94,7 +81,13 @@ class MujocoEngine:
             if not self._step(every):
                 break
             places[k], velocities[k] = place, velocity
-        self._put(states, places, velocities)
+        lost = ~(np.isfinite(places).all(axis=1) & np.isfinite(velocities).all(axis=1))
+        places[lost], velocities[lost] = np.nan, np.nan
+        spins = velocities[:, 3:]
+        if self.turns:  # MuJoCo's are about the cube's own axes
+            spins = (matrices(places[:, 3:]) @ spins[..., None])[..., 0]
+        axes = len(self.axes)
+        self.put(states, places[:, :axes], velocities[:, :axes], places[:, 3:], spins)
         return count * every
 
     def _step(self, steps: int) -> bool:
@@ -117,40 +110,20 @@ class MujocoEngine:
         self._unseen = 0
         return True
 
-    def _place(self) -> None:
-        """Put the cube where it is launched; its own axes are the world's then, the nodes being as launched."""
-        launch, data, axes = self._launch, self._data, self._axes
-        data.qpos[: len(axes)], data.qvel[: len(axes)] = launch["position"][axes], launch["velocity"][axes]
-        if self._turns:
-            data.qvel[3:] = launch["angular_momentum"] / self._inertia
 
-    def _put(self, states: States, places: Array, velocities: Array) -> None:
-        """Make states of coordinates; a free joint's are place and quaternion, velocity and spin about its own axes."""
-        axes = self._axes
-        lost = ~(np.isfinite(places).all(axis=1) & np.isfinite(velocities).all(axis=1))
-        places[lost], velocities[lost] = np.nan, np.nan
-        states[:] = self._launch
-        states["position"][:, axes], states["velocity"][:, axes] = places[:, : len(axes)], velocities[:, : len(axes)]
-        if self._turns:
-            rotations = matrices(places[:, 3:])
-            spins = (rotations @ velocities[:, 3:, None])[..., 0]
-            states["angular_velocity"], states["angular_momentum"] = spins, self._inertia * spins
-            states["node_offset"] = turned(rotations, self._launch["node_offset"])
-
-
-def _compiled(scene: Scene, model: str, nodes: Array, h: float) -> mujoco.MjModel:
-    """Return the scene as MuJoCo takes it, in steps of h [s]."""
-    spec = mujoco.MjSpec()
-    _set(spec.option, scene, h)
-    _add_cube(spec, scene, model, nodes)
-    if model in TOUCHING:
-        _add_ground(spec, scene, model)
+def _compiled(run: Mujoco) -> mujoco.MjModel:
+    """Return the scene of a run as MuJoCo takes it."""
+    spec, scene = mujoco.MjSpec(), run.scene
+    _set(spec.option, scene, run.h)
+    _add_cube(spec, scene, run.start["node_offset"], None if run.turns else run.axes)
+    if run.model in TOUCHING:
+        _add_ground(spec, scene, run.model)
     compiled = spec.compile()
     stiff = _SOFT * (1 - _IMPEDANCE) / scene.cube.mass
     compiled.body_invweight0[1, :] = _SOFT / scene.cube.mass
     compiled.pair_solref[:] = -stiff * scene.ground.stiffness, -stiff * scene.ground.damping
     # The first number is of no effect, but both at zero stand for the normal direction's. MuJoCo divides by d.
-    compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / h
+    compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / run.h
     return compiled
 
 
@@ -166,13 +139,14 @@ def _set(option: mujoco.MjOption, scene: Scene, h: float) -> None:
     option.disableflags = sum(int(mujoco.mjtDisableBit.__members__[f"mjDSBL_{name}"]) for name in _OFF)
 
 
-def _add_cube(spec: mujoco.MjSpec, scene: Scene, model: str, nodes: Array) -> None:
+def _add_cube(spec: mujoco.MjSpec, scene: Scene, nodes: Array, axes: list[int] | None) -> None:
+    """Add the cube, which slides along these axes; None lets it turn, too."""
     cube = scene.cube
     body = spec.worldbody.add_body(name="cube")
-    if model in TURNING:
+    if axes is None:
         body.add_freejoint()
     else:
-        for axis in _AXES[model]:
+        for axis in axes:
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=np.eye(3)[axis])
     body.explicitinertial = True
     body.mass, body.ipos, body.inertia = cube.mass, np.zeros(3), np.full(3, cube.moment_of_inertia)

@@ -10,38 +10,21 @@ import math
 
 import numpy as np
 
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, Physics, States, physics_of
-from stiffdice.scene.scene import Scene
-
-LAG = 0.5
-SCHEME = "symplectic_euler"
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of
+from stiffdice.simulation.engines.adapter import Engine
 
 
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return None: every scene and model can be represented."""
-    return None
-
-
-def versions() -> str:
-    """Return the engine's name and version."""
-    return f"numpy {np.__version__}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> NumpyLoop:
-    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
-    return NumpyLoop(scene, model, launch, h)
-
-
-class NumpyLoop:
+class NumpyLoop(Engine):
     """One run, standing where the last step left it."""
 
-    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
-        """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        self._physics: Physics = physics_of(scene)
-        self._gated, self._model, self._h = scene.ground.contact == "gated", model, h
-        self._normal = np.array(scene.ground.normal)
+    PACKAGE = "numpy"
+
+    def __post_init__(self) -> None:
+        """Take the scene's numbers, and the state of the launch."""
+        self._physics, self._gated = physics_of(self.scene), self.scene.ground.contact == "gated"
+        self._normal = np.array(self.scene.ground.normal)
         self._weight = np.array([0.0, 0.0, -self._physics.node_weight])
-        (state,) = launch.copy()
+        (state,) = self.launch.copy()
         self._x, self._u, self._nodes = state["position"], state["velocity"], state["node_offset"]
         self._spin, self._turning = state["angular_momentum"], state["angular_velocity"]
 
@@ -57,25 +40,25 @@ class NumpyLoop:
 
     def _step(self) -> None:
         forces = self._forces()
-        self._u = self._u + self._h * forces.sum(axis=0) / self._physics.mass  # equation 6
-        self._x = self._x + self._h * self._u  # equation 7
-        if self._model in TURNING:
-            self._spin = self._spin + self._h * _cross(self._nodes, forces).sum(axis=0)  # equations 8 and 10
+        self._u = self._u + self.h * forces.sum(axis=0) / self._physics.mass  # equation 6
+        self._x = self._x + self.h * self._u  # equation 7
+        if self.model in TURNING:
+            self._spin = self._spin + self.h * _cross(self._nodes, forces).sum(axis=0)  # equations 8 and 10
             self._turning = self._spin / self._physics.inertia
-            self._nodes = _rotated(self._nodes, self._turning * self._h)
+            self._nodes = _rotated(self._nodes, self._turning * self.h)
 
     def _forces(self) -> Array:
         """Return the force on each node [N], shape (8, 3): its weight, and what the ground does (section 4.2)."""
         nodes, normal, physics = self._nodes, self._normal, self._physics
-        if self._model not in TOUCHING:
+        if self.model not in TOUCHING:
             return np.tile(self._weight, (len(nodes), 1))
         depth = -((self._x + nodes) @ normal)
-        velocity = self._u + (_cross(self._turning, nodes) if self._model in TURNING else np.zeros_like(nodes))
+        velocity = self._u + (_cross(self._turning, nodes) if self.model in TURNING else np.zeros_like(nodes))
         speed = velocity @ normal
         push = np.maximum(0.0, physics.stiffness * np.maximum(0.0, depth) - physics.damping * speed)
         if self._gated:
             push[depth <= 0.0] = 0.0
-        if self._model == "vertical":
+        if self.model == "vertical":
             return push[:, None] * normal + self._weight
         along = velocity - speed[:, None] * normal
         length = np.sqrt((along * along).sum(axis=1)) + physics.cutoff
@@ -93,6 +76,8 @@ def _rotated(nodes: Array, rotation: Array) -> Array:
     angle = math.hypot(*rotation)
     if angle == 0.0:
         return nodes
+    if not math.isfinite(angle):
+        return np.full_like(nodes, np.nan)
     axis = rotation / angle
     along = (nodes @ axis)[:, None] * axis
     return np.asarray(along + math.cos(angle) * (nodes - along) + math.sin(angle) * _cross(axis, nodes))

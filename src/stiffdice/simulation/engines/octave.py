@@ -19,57 +19,43 @@ import numpy as np
 
 from stiffdice.dynamics.state import STATE, TOUCHING, TURNING, Array, States, physics_of
 from stiffdice.errors import StiffdiceError
-from stiffdice.scene.scene import Scene
+from stiffdice.simulation.engines.adapter import Engine
 
 PROGRAM = shutil.which("octave-cli")
 if PROGRAM is None:
     raise ModuleNotFoundError("octave-cli is not on the PATH", name="octave-cli")
 
-LAG = 0.5
-SCHEME = "symplectic_euler"
-
 SCRIPT = Path(__file__).with_suffix(".m")
 
-# Steps of one request: about a second of work, so that an orphan does not outlive it.
-_BATCH = 4000
 
-
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return None: every scene and model can be represented."""
-    return None
-
-
-@cache
-def versions() -> str:
-    """Return the engine's name and version."""
-    told = subprocess.run([str(PROGRAM), "--version"], capture_output=True, text=True, check=True).stdout
-    return f"octave {told.splitlines()[0].split()[-1]}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> Octave:
-    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
-    return Octave(scene, model, launch, h)
-
-
-class Octave:
+class Octave(Engine):
     """One run, standing where the last step left it."""
 
-    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
-        """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        p = physics_of(scene)
-        flags = model in TURNING, model in TOUCHING, model != "vertical", scene.ground.contact == "gated"
-        numbers = h, p.mass, p.inertia, p.node_weight, p.stiffness, p.damping, p.friction, p.cutoff, p.nx, p.ny, p.nz
-        self._constants = np.array([*flags, *numbers], float)
-        self._state = launch.copy()
+    BATCH = 4000  # steps of one request: about a second of work, so that an orphan does not outlive it
+
+    def __post_init__(self) -> None:
+        """Take the scene's numbers, and the state of the launch."""
+        p, model = physics_of(self.scene), self.model
+        flags = model in TURNING, model in TOUCHING, model != "vertical", self.scene.ground.contact == "gated"
+        rest = p.mass, p.inertia, p.node_weight, p.stiffness, p.damping, p.friction, p.cutoff, p.nx, p.ny, p.nz
+        self._constants = np.array([*flags, self.h, *rest], float)
+        self._state = self.launch.copy()
+
+    @classmethod
+    @cache
+    def version(cls) -> str:
+        """Return the engine's name and version."""
+        told = subprocess.run([str(PROGRAM), "--version"], capture_output=True, text=True, check=True).stdout
+        return f"octave {told.splitlines()[0].split()[-1]}"
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
-        at_once = max(1, _BATCH // every)
+        at_once = max(1, self.BATCH // every)
         for first in range(0, len(states), at_once):
             part = states[first : first + at_once]
-            for done in range(0, every - _BATCH, _BATCH):
-                self._state = self._asked(1, min(_BATCH, every - _BATCH - done))
-            part[:] = self._asked(len(part), min(every, _BATCH))
+            for done in range(0, every - self.BATCH, self.BATCH):
+                self._state = self._asked(1, min(self.BATCH, every - self.BATCH - done))
+            part[:] = self._asked(len(part), min(every, self.BATCH))
             self._state = part[-1:].copy()
         return len(states) * every
 

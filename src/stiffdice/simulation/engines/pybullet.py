@@ -30,15 +30,13 @@ import sys
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.rotation import matrices, turned
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of
+from stiffdice.dynamics.state import TOUCHING, States, physics_of
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines.compatibility import gated_rigid
+from stiffdice.simulation.engines.adapter import RigidBody
 
 
 @contextmanager
@@ -58,9 +56,6 @@ def _quiet() -> Iterator[None]:
 with _quiet():  # it tells when it was built
     import pybullet
 
-LAG = 0.5
-SCHEME = "sequential_impulse"
-
 # Of the spheres that stand for the nodes, in units of the cube's radius: the arm of friction is too long by it.
 _SPHERE = 1e-6
 
@@ -74,35 +69,23 @@ _BATCH = 1024
 _ENDLESS = 1e300
 
 
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return in one sentence why Bullet cannot represent a scene and model, or None if it can."""
-    return gated_rigid("Bullet", scene, model)
-
-
-def versions() -> str:
-    """Return the engine's name and version."""
-    return f"pybullet {version('pybullet')}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float) -> PybulletEngine:
-    """Return a run from a launch, shape (1,), in steps of h [s]; the tolerance is for others."""
-    return PybulletEngine(scene, model, launch, h)
-
-
-class PybulletEngine:
+class Pybullet(RigidBody):
     """One run, standing where the last step left it, in a Bullet server of its own."""
 
-    def __init__(self, scene: Scene, model: str, launch: States, h: float) -> None:
-        """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        self._launch, self._turns, self._h = launch[0].copy(), model in TURNING, h
-        self._inertia, self._batch = scene.cube.moment_of_inertia, 0
-        self._client = pybullet.connect(pybullet.DIRECT)
+    NAME = "Bullet"
+    PACKAGE = "pybullet"
+    SCHEME = "sequential_impulse"
+
+    def __post_init__(self) -> None:
+        """Set up Bullet's model of the scene, at the launch."""
+        super().__post_init__()
+        self._batch, self._client = 0, pybullet.connect(pybullet.DIRECT)
         weakref.finalize(self, pybullet.disconnect, self._client)
-        pybullet.setGravity(0, 0, -scene.gravity, physicsClientId=self._client)
-        self._set(scene, _top_speed(scene, self._launch))
-        self._cube = self._add_cube(scene, model)
-        if model in TOUCHING:
-            self._add_ground(scene)
+        pybullet.setGravity(0, 0, -self.scene.gravity, physicsClientId=self._client)
+        self._set(_top_speed(self.scene, self.start))
+        self._cube = self._add_cube()
+        if self.model in TOUCHING:
+            self._add_ground()
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
@@ -113,7 +96,8 @@ class PybulletEngine:
             velocity, spin = pybullet.getBaseVelocity(self._cube, self._client)
             row[:] = *place, turn[3], *turn[:3], *velocity, *spin
         rows[~np.isfinite(rows).all(axis=1)] = np.nan
-        self._put(states, rows[:, :7], rows[:, 7:])
+        places, turns, velocities, spins = np.split(rows, [3, 7, 10], axis=1)
+        self.put(states, places[:, self.axes], velocities[:, self.axes], turns, spins)
         return len(states) * every
 
     def _step(self, steps: int) -> None:
@@ -121,37 +105,30 @@ class PybulletEngine:
             batch = min(_BATCH, 1 << steps.bit_length() - 1)
             if batch != self._batch:
                 pybullet.setPhysicsEngineParameter(
-                    fixedTimeStep=self._h * batch, numSubSteps=batch, physicsClientId=self._client
+                    fixedTimeStep=self.h * batch, numSubSteps=batch, physicsClientId=self._client
                 )
                 self._batch = batch
             pybullet.stepSimulation(self._client)
             steps -= batch
 
-    def _put(self, states: States, places: Array, velocities: Array) -> None:
-        states[:] = self._launch
-        states["position"], states["velocity"] = places[:, :3], velocities[:, :3]
-        if self._turns:
-            states["angular_velocity"] = velocities[:, 3:]
-            states["angular_momentum"] = self._inertia * velocities[:, 3:]
-            states["node_offset"] = turned(matrices(places[:, 3:]), self._launch["node_offset"])
-
-    def _set(self, scene: Scene, speed: float) -> None:
-        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self._h
-        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self._h / scene.cube.mass
+    def _set(self, speed: float) -> None:
+        scene = self.scene
+        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self.h
+        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self.h / scene.cube.mass
         # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
         residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
             solverResidualThreshold=residual * residual,
-            contactBreakingThreshold=speed * self._h + 4 * _SPHERE * scene.cube.radius,
+            contactBreakingThreshold=speed * self.h + 4 * _SPHERE * scene.cube.radius,
             contactSlop=0,
             restitutionVelocityThreshold=0,
             enableConeFriction=1,
             physicsClientId=self._client,
         )
 
-    def _add_cube(self, scene: Scene, model: str) -> int:
-        cube, ground, launch = scene.cube, scene.ground, self._launch
+    def _add_cube(self) -> int:
+        cube, ground, launch = self.scene.cube, self.scene.ground, self.start
         nodes = launch["node_offset"]
         shape = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_SPHERE] * len(nodes),
@@ -167,22 +144,22 @@ class PybulletEngine:
             -1,
             contactStiffness=ground.stiffness,
             contactDamping=ground.damping,
-            lateralFriction=ground.friction if model != "vertical" else 0,
-            localInertiaDiagonal=[self._inertia if self._turns else 0] * 3,
+            lateralFriction=ground.friction if self.model != "vertical" else 0,
+            localInertiaDiagonal=[self.inertia if self.turns else 0] * 3,
             maxJointVelocity=_ENDLESS,
             **_PLAIN,
             physicsClientId=self._client,
         )
-        spin = launch["angular_momentum"] / self._inertia if self._turns else np.zeros(3)
+        spin = self.spin if self.turns else np.zeros(3)
         pybullet.resetBaseVelocity(body, launch["velocity"].tolist(), spin.tolist(), self._client)
         return body
 
-    def _add_ground(self, scene: Scene) -> None:
-        normal = np.array(scene.ground.normal)
+    def _add_ground(self) -> None:
+        normal = np.array(self.scene.ground.normal)
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=normal.tolist(), physicsClientId=self._client
         )
-        lowered = (-_SPHERE * scene.cube.radius * normal).tolist()
+        lowered = (-_SPHERE * self.scene.cube.radius * normal).tolist()
         body = pybullet.createMultiBody(0, shape, basePosition=lowered, physicsClientId=self._client)
         pybullet.changeDynamics(
             body,

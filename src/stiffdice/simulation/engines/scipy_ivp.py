@@ -13,8 +13,8 @@ the setting that was fastest for it at equal error, out of those tried (throw to
 - Absolute tolerances are 0.01 of the relative one times a natural size of each component: the radius, the speed √(2E/m)
   and the angular momentum √(2EI) of the launch's energy E, and one. Factors from 1 to 10⁻⁴ gave the same curve.
 
-As an engine (`simulator: scipy`) it is LSODA, which tells the state after each of our steps between its own; each
-`advance` goes on from where the last one ended, in a new integration.
+Each `advance` goes on from where the last one ended, in a new integration; as an engine (`simulator: scipy`) it is
+LSODA, which tells the state after each of our steps between its own.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import scipy
 from scipy.integrate import ode, odeint, solve_ivp
 
 from stiffdice.dynamics.compilation import njit
@@ -35,13 +34,8 @@ from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, TURNING, Array, Physics, States, physics_of, start_of
-from stiffdice.integrators import registry as schemes
-from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.fixed_step import Path
-
-LAG = 0.0
-SCHEME = "lsoda"
+from stiffdice.simulation.engines.adapter import Engine
 
 # The absolute tolerance of each component, in units of the relative one and of the component's natural size.
 ABSOLUTE = 0.01
@@ -56,8 +50,6 @@ _NUMBERS = len(Physics._fields)
 
 Slope = Callable[[float, Array, Array, States], Array]
 Slopes = Callable[[float, Array, Array, States, Array], Array]
-Given = tuple[Slope, Slopes, Array, States]
-Solution = tuple[Array, int]
 
 
 @njit
@@ -150,111 +142,126 @@ def _states(model: Any, numbers: Array, solution: Array, states: States) -> None
         _put(model, numbers, solution[k], states[k])
 
 
-def prepare(scene: Scene, model: str, method: str, samples: int, tolerance: float) -> Callable[[], Path]:
-    """Return a function that solves the scene's motion by a method of METHODS.
+class _Solver(Engine):
+    """One run, told every h [s], standing where `advance` left it."""
 
-    samples: equal parts of the duration, after each of which the state is known. tolerance [1]: SciPy's rtol. Raises
-    InputError for an unknown name or a number out of range.
-    """
-    solve = METHODS[validation.choice("method", method, METHODS)]
-    validation.choice("model", model, MODELS)
-    tolerance = validation.number("tolerance", tolerance, "1", above=0)
-    times = np.linspace(0.0, scene.duration, validation.count("samples", samples) + 1)
-    sizes, launch = _sizes(scene, model), start_of(scene, model)
-    given = _given(scene, model, launch)
+    LAG = 0.0
+    PACKAGE = "scipy"
 
-    def run() -> Path:
-        solution, evaluations = _solved(solve, _start(launch, model), times, tolerance, sizes, given)
-        states = np.zeros(len(times), STATE)
-        _states(MODELS[model], given[2], solution, states)
-        return Path(states, evaluations, evaluations)
-
-    return run
-
-
-def unfit(scene: Scene, model: str) -> str | None:
-    """Return None: every scene and model can be represented."""
-    return None
-
-
-def versions() -> str:
-    """Return the engine's name and version."""
-    return f"scipy {scipy.__version__}"
-
-
-def start(scene: Scene, model: str, launch: States, h: float, tolerance: float, most: int = schemes.BUDGET) -> Lsoda:
-    """Return a run of LSODA from a launch, shape (1,), told every h [s]; tolerance [1]: SciPy's rtol.
-
-    most: force evaluations, after which it ends.
-    """
-    return Lsoda(scene, model, launch, h, tolerance, most)
-
-
-class Lsoda:
-    """One run, standing where `advance` left it."""
-
-    def __init__(self, scene: Scene, model: str, launch: States, h: float, tolerance: float, most: int) -> None:
-        """Take the scene's numbers, and the state of the launch, shape (1,)."""
-        self._model, self._h, self._tolerance, self._left = model, h, tolerance, most
-        self._sizes, self._y = _sizes(scene, model), _start(launch, model)
-        self._slope, slopes, numbers, room = _given(scene, model, launch)
-        self._given: Given = self._counted, slopes, numbers, room
+    def __post_init__(self) -> None:
+        """Take the scene's numbers, and the state of the launch."""
+        (launch,) = self.launch
+        parts = [launch["position"], launch["velocity"]]
+        if self.model in TURNING:
+            parts += [[1.0, 0.0, 0.0, 0.0], launch["angular_momentum"]]
+        self._y, self._sizes = np.concatenate(parts), _sizes(self.scene, self.model)
+        self._numbers: Array = np.array([*physics_of(self.scene), *launch["node_offset"].ravel()])
+        self._room = np.zeros(1, STATE)
+        self._plain, self._slopes = equations(self.model, self.scene.ground.contact)
+        # A counter in Python takes a part of the time of an evaluation.
+        self._slope: Slope = self._plain if self.most is None else self._counted
+        self._evaluations = 0
 
     def advance(self, states: States, every: int) -> int:
-        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
-        times: Array = self._h * every * np.arange(len(states) + 1.0)
-        before = self._left
-        try:
-            solution, evaluations = _solved(_lsoda, self._y, times, self._tolerance, self._sizes, self._given)
-        except _SpentError:
-            solution, evaluations = np.full((len(times), len(self._y)), np.nan), before
-        _states(MODELS[self._model], self._given[2], solution[1:], states)
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations.
+
+        Not-a-number from where the solver fails on, and everywhere where it would take more evaluations than `most`.
+        """
+        times: Array = self.h * every * np.arange(len(states) + 1.0)
+        solution, evaluations = np.full((len(times), len(self._y)), np.nan), 0
+        if np.isfinite(self._y).all():
+            before = self._evaluations
+            with warnings.catch_warnings():  # a run that fails is a result
+                warnings.simplefilter("ignore")
+                try:
+                    found, evaluations = self._solve(times)
+                    solution[: len(found)] = found
+                except _SpentError:
+                    evaluations = (self.most or 0) - before
+        _states(MODELS[self.model], self._numbers, solution[1:], states)
         self._y = solution[-1]
         return evaluations
 
     def _counted(self, t: float, y: Array, numbers: Array, room: States) -> Array:
         """Return dy/dt. Between two of these Python sees a signal, which within odeint it does not."""
-        self._left -= 1
-        if self._left < 0:
+        self._evaluations += 1
+        if self._evaluations > (self.most or 0):
             raise _SpentError
-        return self._slope(t, y, numbers, room)
+        return self._plain(t, y, numbers, room)
+
+    def _solve(self, times: Array) -> tuple[Array, int]:
+        """Return the solution at these times [s], shape (time, component), fewer if it fails, and evaluations."""
+        raise NotImplementedError
 
 
 class _SpentError(Exception):
     """All evaluations that were allowed are done."""
 
 
-def _solved(
-    solve: Callable[[Array, Array, float, Array, Given], Solution],
-    start: Array,
-    times: Array,
-    tolerance: float,
-    sizes: Array,
-    given: Given,
-) -> Solution:
-    """Return what a method of METHODS finds, shape (time, component): not-a-number from where it fails on."""
-    whole = np.full((len(times), len(start)), np.nan)
-    if not np.isfinite(start).all():
-        return whole, 0
-    with warnings.catch_warnings():  # a run that fails is a result
-        warnings.simplefilter("ignore")
-        solution, evaluations = solve(start, times, tolerance, sizes, given)
-    whole[: len(solution)] = solution
-    return whole, evaluations
+class Dop853(_Solver):
+    """Dormand and Prince's method of order 8."""
+
+    SCHEME = "dop853"
+
+    def _solve(self, times: Array) -> tuple[Array, int]:
+        evaluations = 0
+
+        def counted(t: float, y: Array) -> Array:
+            nonlocal evaluations
+            evaluations += 1
+            return self._slope(t, y, self._numbers, self._room)
+
+        solver = ode(counted)
+        absolute = float(ABSOLUTE * self.tolerance * self._sizes.min())  # it takes one for all
+        solver.set_integrator("dop853", rtol=self.tolerance, atol=absolute, nsteps=_MOST_STEPS)
+        solver.set_initial_value(self._y, times[0])
+        solution = [self._y]
+        for time in times[1:]:
+            reached = solver.integrate(time)
+            if not solver.successful():
+                break
+            solution.append(reached)
+        return np.array(solution), evaluations
 
 
-def _given(scene: Scene, model: str, launch: States) -> Given:
-    """Return what the equations of motion of a scene and model need besides the time and the solution."""
-    numbers: Array = np.array([*physics_of(scene), *launch["node_offset"].ravel()])
-    return *equations(model, scene.ground.contact), numbers, np.zeros(1, STATE)
+class Lsoda(_Solver):
+    """Adams' methods and, where the motion is stiff, backward differentiation."""
+
+    SCHEME = "lsoda"
+
+    def _solve(self, times: Array) -> tuple[Array, int]:
+        solution, told = odeint(
+            self._slope,
+            self._y,
+            times,
+            args=(self._numbers, self._room),
+            tfirst=True,
+            rtol=self.tolerance,
+            atol=ABSOLUTE * self.tolerance * self._sizes,
+            mxstep=_MOST_STEPS,
+            full_output=True,
+        )
+        done = told["message"] == "Integration successful."
+        return solution if done else solution[:1], int(told["nfe"][-1])
 
 
-def _start(launches: States, model: str) -> Array:
-    (launch,) = launches
-    parts = [launch["position"], launch["velocity"]]
-    if model in TURNING:
-        parts += [[1.0, 0.0, 0.0, 0.0], launch["angular_momentum"]]
-    return np.concatenate(parts)
+class Radau(_Solver):
+    """The implicit Runge-Kutta method of order 5."""
+
+    SCHEME = "radau"
+
+    def _solve(self, times: Array) -> tuple[Array, int]:
+        found = solve_ivp(
+            lambda t, y: self._slope(t, y, self._numbers, self._room),
+            (times[0], times[-1]),
+            self._y,
+            method="Radau",
+            t_eval=times,
+            rtol=self.tolerance,
+            atol=ABSOLUTE * self.tolerance * self._sizes,
+            jac=lambda t, y: self._slopes(t, y, self._numbers, self._room, self._sizes),
+        )
+        return found.y.T, int(found.nfev + (len(self._y) + 1) * found.njev)
 
 
 def _sizes(scene: Scene, model: str) -> Array:
@@ -266,64 +273,3 @@ def _sizes(scene: Scene, model: str) -> Array:
     if model in TURNING:
         sizes += [1.0] * 4 + [math.sqrt(2 * energy * physics.inertia)] * 3
     return np.array(sizes, float)
-
-
-def _dop853(start: Array, times: Array, tolerance: float, sizes: Array, given: Given) -> Solution:
-    slope, _, numbers, room = given
-    evaluations = 0
-
-    def counted(t: float, y: Array) -> Array:
-        nonlocal evaluations
-        evaluations += 1
-        return slope(t, y, numbers, room)
-
-    solver = ode(counted)
-    absolute = float(ABSOLUTE * tolerance * sizes.min())  # it takes one for all
-    solver.set_integrator("dop853", rtol=tolerance, atol=absolute, nsteps=_MOST_STEPS)
-    solver.set_initial_value(start, times[0])
-    solution = [start]
-    for time in times[1:]:
-        reached = solver.integrate(time)
-        if not solver.successful():
-            break
-        solution.append(reached)
-    return np.array(solution), evaluations
-
-
-def _lsoda(start: Array, times: Array, tolerance: float, sizes: Array, given: Given) -> Solution:
-    slope, _, numbers, room = given
-    solution, told = odeint(
-        slope,
-        start,
-        times,
-        args=(numbers, room),
-        tfirst=True,
-        rtol=tolerance,
-        atol=ABSOLUTE * tolerance * sizes,
-        mxstep=_MOST_STEPS,
-        full_output=True,
-    )
-    done = told["message"] == "Integration successful."
-    return solution if done else solution[:1], int(told["nfe"][-1])
-
-
-def _radau(start: Array, times: Array, tolerance: float, sizes: Array, given: Given) -> Solution:
-    slope, slopes, numbers, room = given
-    found = solve_ivp(
-        lambda t, y: slope(t, y, numbers, room),
-        (times[0], times[-1]),
-        start,
-        method="Radau",
-        t_eval=times,
-        rtol=tolerance,
-        atol=ABSOLUTE * tolerance * sizes,
-        jac=lambda t, y: slopes(t, y, numbers, room, sizes),
-    )
-    return found.y.T, int(found.nfev + (len(start) + 1) * found.njev)
-
-
-METHODS: dict[str, Callable[[Array, Array, float, Array, Given], Solution]] = {
-    "dop853": _dop853,
-    "lsoda": _lsoda,
-    "radau": _radau,
-}

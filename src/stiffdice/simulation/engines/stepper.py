@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,16 +15,13 @@ from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import fixed_step
 from stiffdice.simulation.engines import registry as engines
-from stiffdice.simulation.engines.registry import ENGINES, PEERS, Engine
-
-# An evaluation by a peer, most of it spent between languages, takes about as long as so many of ours.
-DEARER = {"mujoco": 100, "pybullet": 100, "drake": 300, "numpy": 500, "octave": 3000}
-_OTHERS_DEARER = 100
+from stiffdice.simulation.engines.adapter import Engine
+from stiffdice.simulation.engines.registry import ENGINES, PEERS
 
 
 def dearness(method: str) -> float:
     """Return about how many steps of our simplest scheme take as long as one of a method's."""
-    return DEARER.get(method, _OTHERS_DEARER) if method in PEERS else 1.0
+    return PEERS[method].dearness if method in PEERS else 1.0
 
 
 def chosen_from(names: Sequence[str]) -> list[str]:
@@ -37,7 +34,7 @@ def chosen_from(names: Sequence[str]) -> list[str]:
 
 def attributes(methods: Sequence[str]) -> dict[str, str]:
     """Return the attribute that says of which versions the engines and solvers among methods are."""
-    found = dict.fromkeys(engines.adapter_of(name, "methods").versions() for name in methods if name in PEERS)
+    found = dict.fromkeys(engines.adapter_of(name, "methods").version() for name in methods if name in PEERS)
     return {"engine_versions": "; ".join(found)} if found else {}
 
 
@@ -48,15 +45,14 @@ def own_steps(method: str) -> bool:
 
 def lag(method: str) -> float:
     """Return by how many steps a method's velocity is behind the place, as `registry.LAGS`."""
-    return float(engines.adapter_of(method).LAG) if method in ENGINES else schemes.LAGS[method]
+    return engines.adapter_of(method).LAG if method in ENGINES else schemes.LAGS[method]
 
 
 def unfit(method: str, scene: Scene, model: str) -> str | None:
     """Return in one sentence why a method cannot represent a scene and model, or None if it can."""
-    why: str | None = (
-        engines.adapter_of(method).unfit(scene, model) if method in ENGINES else schemes.unfit(method, scene, model)
-    )
-    return why
+    if method in ENGINES:
+        return engines.adapter_of(method).unfit(scene, model)
+    return schemes.unfit(method, scene, model)
 
 
 def start(
@@ -64,9 +60,8 @@ def start(
 ) -> Engine:
     """Return a run from a launch, shape (1,), in steps of h [s]; tolerance [1]: for one that controls its error."""
     if method in ENGINES:
-        engine: Engine = engines.adapter_of(method).start(scene, model, launch.copy(), h, tolerance)
-        return engine
-    return _Scheme(method, scene, model, launch, h, tolerance)
+        return engines.adapter_of(method)(scene, model, launch, h, tolerance)
+    return _Scheme(scene, model, launch, h, tolerance, scheme=method)
 
 
 def ready(
@@ -86,17 +81,19 @@ def ready(
     return launched
 
 
-class _Scheme:
+@dataclass(eq=False)
+class _Scheme(Engine):
     """One run of a scheme, standing where the last step left it."""
 
-    def __init__(self, scheme: str, scene: Scene, model: str, launch: States, h: float, tolerance: float) -> None:
-        self._tags: tuple[Any, ...] = schemes.SCHEMES[scheme], MODELS[model], LAWS[scene.ground.contact]
-        self._physics, self._h, self._tolerance = physics_of(scene), h, tolerance
-        self._state = launch.copy()
+    scheme: str = ""
+
+    def __post_init__(self) -> None:
+        self._tags = schemes.SCHEMES[self.scheme], MODELS[self.model], LAWS[self.scene.ground.contact]
+        self._physics, self._state = physics_of(self.scene), self.launch.copy()
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
         whole = np.concatenate([self._state, states])
-        evaluations = fixed_step.advance(*self._tags, self._physics, whole, every, self._h, self._tolerance)
+        evaluations = fixed_step.advance(*self._tags, self._physics, whole, every, self.h, self.tolerance)
         states[:], self._state = whole[1:], whole[-1:]
         return int(evaluations)
