@@ -107,55 +107,23 @@ CHANGES = {
     ],
     # A ground twice as stiff as it says.
     "dynamics/contact.py": [
-        ("LAWS = {", "class Twice(NamedTuple):\n    pass\n\n\nLAWS = {"),
-        ('"gated": Gated()}', '"gated": Gated(), "twice": Twice()}'),
-        ("Gated: _gated_force}", "Gated: _gated_force, Twice: _twice_force}"),
-        ("Gated: _gated_slopes}", "Gated: _gated_slopes, Twice: _twice_slopes}"),
-        ("Gated: _gated_reaches}", "Gated: _gated_reaches, Twice: _gated_reaches}"),
-        ("Gated: _gated_acts}", "Gated: _gated_acts, Twice: _gated_acts}"),
         (
-            "@njit\ndef _gated_reaches",
-            """@njit
-def _twice_force(depth: float, speed: float, stiffness: float, damping: float) -> float:
-    return _gated_force(depth, speed, 2.0 * stiffness, damping)
-
-
-@njit
-def _twice_slopes(depth: float, speed: float, stiffness: float, damping: float) -> tuple[float, float]:
-    return _gated_slopes(depth, speed, 2.0 * stiffness, damping)
-
-
-@njit
-def _gated_reaches""",
-        ),
-    ],
-    "scene/ground.py": [('("ungated", "gated")', '("ungated", "gated", "twice")')],
-    "scene/flat_landing.py": [('"gated": 1.0}', '"gated": 1.0, "twice": 1.0}')],
-    "dynamics/flat_bounce.py": [
-        ("import LAWS, Gated", "import LAWS, Twice, Gated"),
-        ("Gated: _lower_nodes}", "Gated: _lower_nodes, Twice: _lower_nodes}"),
-    ],
-    "integrators/event_driven/active_set.py": [
-        ("import Gated", "import Twice, Gated"),
-        ("Gated: _left_alone}", "Gated: _left_alone, Twice: _left_alone}"),
-    ],
-    "simulation/fast_forward.py": [
-        ("import Gated", "import Twice, Gated"),
-        ("Gated: _always}", "Gated: _always, Twice: _always}"),
-    ],
-    "integrators/batched_kernel.py": [
-        ("import LAWS, Gated", "import LAWS, Twice, Gated"),
-        ("Gated: _gated_push}", "Gated: _gated_push, Twice: _twice_push}"),
-        (
-            "# (law, depth, drag, stiffness)",
-            """@inlined
+            "LAWS = {",
+            """@_inlined
 def _twice_push(depth: Any, drag: Any, stiffness: float) -> Any:
     return _gated_push(depth, drag, 2.0 * stiffness)
 
 
-# (law, depth, drag, stiffness)""",
+class Twice(NamedTuple):
+    pass
+
+
+LAWS = {""",
         ),
+        ('"gated": Gated()}', '"gated": Gated(), "twice": Twice()}'),
+        ("Gated: _gated_push}", "Gated: _gated_push, Twice: _twice_push}"),
     ],
+    "scene/flat_landing.py": [('"gated": 1.0}', '"gated": 1.0, "twice": 1.0}')],
     "report/figures/style.py": [
         (
             '    "trajectory": {"color": PURPLE',

@@ -33,7 +33,7 @@ def made(project, *names):
         ("paper", "figure-13.svg (Figure 13: steps needed against stiffness)"),
         ("quick", "frontier.svg (Steps needed against stiffness)"),
         ("stability", "map-sliding.svg (Where a sliding cube passes)"),
-        ("extremes", "atlas.svg (Where and how runs fail"),
+        ("extremes", "failure-map.svg (Where and how runs fail"),
         ("tradeoff", "evaluations-position.svg (Error of the position against force evaluations)"),
         ("refinement", "refinement.svg (A cube that slides: the dense grid's answer"),
         ("engines", "limits.svg (One flat bounce with longer and longer steps"),

@@ -2,7 +2,7 @@
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
-versions that compile them. What is in it is digested, too (`kernel_cache`).
+versions that compile them. What is in it is digested, too, and known by the processor it is for (`kernel_cache`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _BLOCK = 4096  # bytes: a full disk has not one
 
 def _cache_folder() -> Path:
     parts = [code_digest("stiffdice.simulation.run"), version("numba"), version("numpy"), version("llvmlite")]
-    name = "kernels-" + hashlib.sha256(" ".join([*parts, _cpu()]).encode()).hexdigest()[:16]
+    name = "kernels-" + hashlib.sha256(" ".join(parts).encode()).hexdigest()[:16]
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     fallback = _temporary() / f"stiffdice-{os.getuid()}"
     try:
@@ -72,15 +72,6 @@ def _temporary() -> Path:
         return Path(tempfile.gettempdir())
     except OSError:  # there is none that can be written
         return Path("/tmp")
-
-
-def _cpu() -> str:
-    """Return what tells this machine's processor from another's that shares the home folder."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return os.uname().machine
-    return "\n".join(sorted({line for line in lines if line.startswith(("model name", "flags", "Features"))}))
 
 
 # In the environment for child processes and for numba to find when it reads it again; in its configuration in case
@@ -144,6 +135,16 @@ def njit(*function: Any, **options: Any) -> Any:
         return _Part(python, targetoptions=options)
 
     return part(*function) if function else part
+
+
+def constant(value: Any) -> Any:
+    """Return a function, for compiled code only, that returns a value whatever its arguments."""
+
+    @njit
+    def body(*arguments: Any) -> Any:
+        return value
+
+    return body
 
 
 def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:

@@ -21,17 +21,17 @@ def kinetic(physics: Physics, state: Any) -> float:
 
 
 @njit
-def kinetic_at_place(model: Any, law: Any, physics: Physics, state: Any, behind: float) -> float:
-    """Return the kinetic energy [J] at the time of the place, where the velocities are those of `behind` [s] before.
+def kinetic_at_place(model: Any, law: Any, physics: Physics, state: Any, lag_time: float) -> float:
+    """Return the kinetic energy [J] at the time of the place, where the velocities are those of `lag_time` [s] before.
 
     They are moved on at the acceleration of the state, as leapfrog's half-step velocities are (Hairer, Lubich and
     Wanner, Geometric Numerical Integration, I.1.4).
     """
     fx, fy, fz, tx, ty, tz = models.force(model, law, physics, state)
-    late = behind / physics.mass
-    ux, uy, uz = state.velocity[0] + late * fx, state.velocity[1] + late * fy, state.velocity[2] + late * fz
+    per_mass = lag_time / physics.mass
+    ux, uy, uz = state.velocity[0] + per_mass * fx, state.velocity[1] + per_mass * fy, state.velocity[2] + per_mass * fz
     momentum = state.angular_momentum
-    lx, ly, lz = momentum[0] + behind * tx, momentum[1] + behind * ty, momentum[2] + behind * tz
+    lx, ly, lz = momentum[0] + lag_time * tx, momentum[1] + lag_time * ty, momentum[2] + lag_time * tz
     return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
 
 
@@ -66,13 +66,13 @@ def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
 
 
 @njit(cache=True)
-def mechanical(model: Any, law: Any, physics: Physics, states: States, behind: float) -> Array:
+def mechanical(model: Any, law: Any, physics: Physics, states: States, lag_time: float) -> Array:
     """Return kinetic + m g z + the springs' energy [J] of each state at the time of its place, shape (state,).
 
-    behind [s]: how much earlier than the place the velocities are.
+    lag_time [s]: how much earlier than the place the velocities are.
     """
     result = np.empty(states.shape[0])
     for k in range(states.shape[0]):
-        moving = kinetic_at_place(model, law, physics, states[k], behind)
+        moving = kinetic_at_place(model, law, physics, states[k], lag_time)
         result[k] = moving + potential(physics, states[k]) + elastic(physics, states[k])
     return result

@@ -20,33 +20,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import LAWS, Gated, Ungated
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import LAWS, approach_damping
 from stiffdice.dynamics.state import Physics, physics_of
 from stiffdice.errors import InputError
-from stiffdice.scene import flat_landing, validation
+from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 
 # Past this damping ratio less than (1/2ζ)² of the speed is left, and squares leave the range of doubles.
 DEAD = 1e150
-
-
-_UNGATED, _GATED = flat_landing.APPROACH_DAMPING["ungated"], flat_landing.APPROACH_DAMPING["gated"]
-
-
-@njit
-def _all_nodes() -> float:
-    return _UNGATED
-
-
-@njit
-def _lower_nodes() -> float:
-    return _GATED
-
-
-# (law) -> how many times as strong the damping of a flat cube is on the way in as on the way out, where the four lower
-# nodes alone are damped: the ungated law damps the four above the ground, too, while they fall.
-approach_damping = by_tag({Ungated: _all_nodes, Gated: _lower_nodes})
 
 
 @njit

@@ -8,19 +8,12 @@ A model leaves something out, and is exact where that would do nothing:
   those four alone;
 - friction and the place on the ground (`vertical`), where nothing moves the cube along level ground.
 
-A rotating inertia tensor is left out of all models: a cube's inertia is the same about every axis.
-
-Exact is meant of the motion, not of round-off in it, nor of what a scheme makes of that:
-
-- Of an upright cube that lands flat all torques cancel to the last bit. Of another, flat on a slope, say, the full
-  model keeps a torque of round-off, which each bounce makes larger: measured, 7 times at S = 1e2, 230 times at 1e4 and
-  2400 times at 1e6 kg/s² (1 kg). The lesser model has none of it.
-- With friction, steps too long for its cutoff (`friction_chatter.py`) make chatter out of that round-off in the full
-  model, within one bounce. It is gone at shorter steps, and none of it is in the scene.
+Exact is meant of the motion, not of round-off, which the full model may amplify: of a cube that is flat on a slope,
+each bounce makes a torque of round-off larger (measured: 7 times at S = 1e2, 2400 times at 1e6 kg/s², 1 kg), and steps
+too long for friction's cutoff make chatter of it (`friction_chatter.py`).
 
 A flat cube whose centre stays above the ground is righted by every contact. On an edge or a corner, or with its centre
-below the ground, a cube may be in balance, too; but there the ground turns it further from the slightest tilt, so that
-no model without rotation stands for what becomes of it.
+below the ground, the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
 """
 
 from __future__ import annotations
@@ -154,8 +147,7 @@ def _heights(scene: Scene) -> Array:
 
 def _along(scene: Scene, vector: validation.Vector) -> float:
     """Return the part of a vector along the ground's normal."""
-    nx, ny, nz = scene.ground.normal
-    return nx * vector[0] + ny * vector[1] + nz * vector[2]
+    return float(along(np.array(vector), scene.ground.normal))
 
 
 def _clears(scene: Scene, longest_step: float) -> bool:

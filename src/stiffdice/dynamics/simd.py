@@ -215,7 +215,10 @@ def total(typing: Any, value: Any) -> Any:
 
 @intrinsic
 def where(typing: Any, mask: Any, yes: Any, no: Any) -> Any:
-    """Return `yes` in the lanes of the mask and `no` in the others; both lanes or numbers."""
+    """Return `yes` in the lanes of the mask and `no` in the others; both lanes or numbers. Of one number, too."""
+    if isinstance(mask, types.Boolean):
+        number = types.float64
+        return number(mask, number, number), lambda context, builder, sig, args: builder.select(*args)
     kinds = [kind if isinstance(kind, Lanes) else types.float64 for kind in (yes, no)]
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:

@@ -19,6 +19,20 @@ PART = 20_000
 BUDGET = 10_000_000
 
 
+def whole(part: Any) -> Any:
+    """Return a function that takes a scheme's step whole, for compiled code: as many parts as it takes."""
+
+    @njit
+    def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+        left, evaluations = h, 0
+        while left > 0.0:
+            left, count, _ = part(model, law, physics, state, left, tolerance, PART)
+            evaluations += count
+        return evaluations
+
+    return step
+
+
 def resumed(part: Any) -> Any:
     """Return a function that takes a scheme's step part by part, for compiled code.
 

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import LAWS, Gated, Ungated
+from stiffdice.dynamics.contact import LAWS, push
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.models.sliding import Sliding
 from stiffdice.dynamics.models.tumbling import Tumbling
@@ -149,20 +149,6 @@ def _times(factor: Any, a: Vector) -> Vector:
 @inlined
 def _along(start: Vector, factor: Any, a: Vector) -> Vector:
     return Vector(start.x + factor * a.x, start.y + factor * a.y, start.z + factor * a.z)
-
-
-@inlined
-def _ungated_push(depth: Any, drag: Any, stiffness: float) -> Any:
-    return max(0.0, stiffness * max(0.0, depth) - drag)
-
-
-@inlined
-def _gated_push(depth: Any, drag: Any, stiffness: float) -> Any:
-    return where(depth > 0.0, max(0.0, stiffness * depth - drag), 0.0)
-
-
-# (law, depth, drag, stiffness) -> the normal force on a node [N], as `contact.normal_force`; drag [N]: damping × speed.
-push = by_tag({Ungated: _ungated_push, Gated: _gated_push}, inlined=True)
 
 
 @inlined

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators import free_flight
 
 
 class ForwardEuler(NamedTuple):
@@ -35,9 +34,3 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.drift(model, physics, state, h)
     models.kick(model, physics, state, wrench, h)
     return 1
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight: u_n = u_0 + n h a, x_n = x_0 + n h u_0 + h² a n(n − 1)/2."""
-    free_flight.flight(model, physics, state, h, steps, LAG)

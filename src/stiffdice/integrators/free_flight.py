@@ -1,13 +1,12 @@
-"""Closed forms that schemes share, and what stands for those that a scheme has not."""
+"""What schemes share: free flight in closed form, and sums of motions and wrenches, six numbers each."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
-from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.state import Motion, Physics
 
 
 @njit
@@ -25,15 +24,24 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int, lag: 
     models.turn(model, physics, state, time)
 
 
-@njit
-def swing(
-    place: float, speed: float, h: float, steps: int, square: float, rate: float, constant: float
-) -> tuple[float, float]:
-    """Return not-a-number twice: so many steps of a damped oscillator have no closed form here, and are stepped."""
-    return math.nan, math.nan
+def lagging(lag: float) -> Any:
+    """Return `flight` of schemes of one lag [steps], for compiled code."""
+
+    @njit
+    def flown(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
+        flight(model, physics, state, h, steps, lag)
+
+    return flown
 
 
 @njit
-def proven() -> bool:
-    """Return that what `fast_forward.py` says of a scheme is not proven."""
-    return False
+def scaled(a: Any, factor: float) -> Motion:
+    """Return factor·a."""
+    return factor * a[0], factor * a[1], factor * a[2], factor * a[3], factor * a[4], factor * a[5]
+
+
+@njit
+def plus(a: Motion, b: Motion, factor: float) -> Motion:
+    """Return a + factor·b."""
+    c = scaled(b, factor)
+    return a[0] + c[0], a[1] + c[1], a[2] + c[2], a[3] + c[3], a[4] + c[4], a[5] + c[5]

@@ -1,23 +1,21 @@
 """Implicit Euler, linear in the contact force: the whole step under the forces at its end, found by linear equations.
 
-Of M(v' − v) = h F(x + h v', v') it takes F linear. That is the formula of Baraff and Witkin (1998, Large steps in cloth
-simulation, SIGGRAPH), (M − h ∂F/∂v − h² ∂F/∂x) Δv = h (F + h ∂F/∂x v), but linear about the place to which free flight
-would take the cube in this step, not about the present one; where the force is linear, that is the same. A node that
-comes to the ground within the step is pressed in it already, and one that leaves is not held back. Linear about the
-present place the cube would first sink by up to h|v|, its springs would hold up to (ωh)² times the energy that it came
-with, and pull, prolonged, on the nodes that they threw up. Here a flat cube's step is that of implicit Euler itself: no
-step gains energy, the springs' included, at any stiffness (its potential is convex; Hairer and Wanner, Solving Ordinary
-Differential Equations II, IV.12). That is paid by the bounce, which keeps about exp(−πωh/2) of its speed where ωh is
-small, and less than (ωh)⁻² where it is large. What is a depth d in the ground comes out at d/h at most; the nodes of
-a turning cube, whose arcs are not linear, may so gain some h ω² r: nothing to speak of below a twentieth of a radian a
-step, and some tenths of the energy at one.
+Of M(v' − v) = h F(x + h v', v') it takes F linear: (M − h ∂F/∂v − h² ∂F/∂x) Δv = h (F + h ∂F/∂x v) (Baraff and Witkin
+1998, Large steps in cloth simulation, SIGGRAPH), but about the place to which free flight would take the cube in this
+step. So a node that comes to the ground within the step is pressed in it already, and one that leaves is not held back.
+About the present place the cube would first sink by up to h|v|, and its springs hold up to (ωh)² times its energy.
 
-Two linear systems make a step, or some more. The first is without friction; again without the nodes that it would hold
-down, until there are none. The last has friction by these normal forces: F_f = −μ F_n u_t/(|u_t| + cutoff) with u_t at
-the end of the step and |u_t| at its begin. This is friction's chord, not its tangent, whose steps would overshoot
-standing still as explicit ones do: it turns no sliding node around, and the matrix stays symmetric and positive
-definite at any coefficient. It errs by μ g h/u, of first order as the rest, which it is with any matrix (Steihaug and
-Wolfbrandt 1979, Math. Comp. 33, 521).
+No step of a flat cube gains energy, the springs' included, at any stiffness (its potential is convex; Hairer and
+Wanner, Solving Ordinary Differential Equations II, IV.12). The bounce pays for it: it keeps about exp(−πωh/2) of its
+speed where ωh is small, and less than (ωh)⁻² where it is large. A depth d comes out of the ground at d/h at most. The
+nodes of a turning cube, whose arcs are not linear, may gain some h ω² r: nothing to speak of below a twentieth of a
+radian a step, and some tenths of the energy at one.
+
+The first system is without friction; it is solved again without the nodes that it would hold down, until there are
+none. The last has friction by these normal forces: F_f = −μ F_n u_t/(|u_t| + cutoff) with u_t at the end of the step
+and |u_t| at its begin. This is friction's chord: its tangent would overshoot standing still as explicit steps do. It
+turns no sliding node around, and the matrix stays symmetric and positive definite at any coefficient. It errs by
+μ g h/u, of first order as the rest (Steihaug and Wolfbrandt 1979, Math. Comp. 33, 521).
 
 One evaluation of the nodes' forces and slopes a step. In free flight it is symplectic Euler.
 """
@@ -30,10 +28,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of, normal_force, normal_slopes, reaches, speed_of
+from stiffdice.dynamics.contact import (
+    height_of,
+    node_velocity,
+    normal_force,
+    normal_slopes,
+    reaches,
+    speed_of,
+    split,
+    upward,
+)
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
-from stiffdice.integrators import free_flight
+from stiffdice.integrators.free_flight import scaled
+from stiffdice.integrators.linear_equations import factorise, solve
 
 
 class ImplicitEuler(NamedTuple):
@@ -64,42 +72,11 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.kick(model, physics, state, weight, h)
     models.drift(model, physics, state, h)
     change = _solved(model, law, physics, state, slips, h)
-    models.move(model, state, _shift(change, h))
-    models.kick(model, physics, state, _impulse(physics, change), 1.0)
-    return 1
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight, those of symplectic Euler."""
-    free_flight.flight(model, physics, state, h, steps, LAG)
-
-
-@njit
-def _shift(change: Array, h: float) -> Motion:
-    return h * change[0], h * change[1], h * change[2], h * change[3], h * change[4], h * change[5]
-
-
-@njit
-def _impulse(physics: Physics, change: Array) -> Motion:
-    """Return the impulse [N s], linear and angular [N m s], that changes velocity [m/s] and spin [rad/s] so."""
+    models.move(model, state, scaled(change, h))
     m, i = physics.mass, physics.inertia
-    return m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
-
-
-@njit
-def _node_velocity(state: Any, k: int) -> tuple[float, float, float]:
-    rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-    wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    return ux + (wy * rz - wz * ry), uy + (wz * rx - wx * rz), uz + (wx * ry - wy * rx)
-
-
-@njit
-def _sliding(physics: Physics, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
-    """Return the part of a velocity along the ground [m/s]."""
-    speed = physics.nx * ux + physics.ny * uy + physics.nz * uz
-    return ux - speed * physics.nx, uy - speed * physics.ny, uz - speed * physics.nz
+    impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
+    models.kick(model, physics, state, impulse, 1.0)
+    return 1
 
 
 @njit
@@ -107,8 +84,7 @@ def _slips(physics: Physics, state: Any) -> Array:
     """Return each node's speed along the ground, cutoff added, shape (node,) [m/s]."""
     slips = np.empty(state.node_offset.shape[0])
     for k in range(slips.shape[0]):
-        ux, uy, uz = _node_velocity(state, k)
-        tx, ty, tz = _sliding(physics, ux, uy, uz)
+        _, tx, ty, tz = split(physics, *node_velocity(state, k))
         slips[k] = math.sqrt(tx * tx + ty * ty + tz * tz) + physics.cutoff
     return slips
 
@@ -151,17 +127,15 @@ def _assemble(
     system[:] = 0.0
     for k in range(system.shape[0]):
         system[k, k] = physics.mass if k < 3 else physics.inertia
-    nx, ny, nz = physics.nx, physics.ny, physics.nz
     pressing = 0
     for k in range(slips.shape[0]):
         rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-        depth = -(nx * (state.position[0] + rx) + ny * (state.position[1] + ry) + nz * (state.position[2] + rz))
-        ux, uy, uz = _node_velocity(state, k)
-        speed = nx * ux + ny * uy + nz * uz
+        depth = -upward(physics, state.position[0] + rx, state.position[1] + ry, state.position[2] + rz)
+        speed, tx, ty, tz = split(physics, *node_velocity(state, k))
         push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
         by_depth, by_speed = normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
         stiffening = h * by_depth - by_speed
-        along = _lever(rx, ry, rz, nx, ny, nz)
+        along = _lever(rx, ry, rz, physics.nx, physics.ny, physics.nz)
         pressed = push - stiffening * _dot(along, change)
         if (nodes >> k) & 1 == 0 or pressed <= 0.0:
             continue
@@ -169,7 +143,6 @@ def _assemble(
         _add(system, along, h * stiffening, h * push)
         if rubbing:
             grip = h * physics.friction * pressed / slips[k]
-            tx, ty, tz = _sliding(physics, ux, uy, uz)
             _add(system, _lever(rx, ry, rz, tx, ty, tz), 0.0, -grip)
             _add(system, _lever(rx, ry, rz, 1.0, 0.0, 0.0), grip, 0.0)
             _add(system, _lever(rx, ry, rz, 0.0, 1.0, 0.0), grip, 0.0)
@@ -205,15 +178,9 @@ def _add(system: Array, along: Motion, resistance: float, impulse: float) -> Non
 
 @njit
 def _solve(system: Array, change: Array) -> None:
-    """Solve a symmetric positive definite system, shape (n, n + 1), by elimination, which needs no pivots there."""
+    """Solve the equations, shape (n, n + 1), of which the last column is the right side."""
     size = system.shape[0]
     for k in range(size):
-        for i in range(k + 1, size):
-            factor = system[i, k] / system[k, k]
-            for j in range(k + 1, size + 1):
-                system[i, j] -= factor * system[k, j]
-    for k in range(size - 1, -1, -1):
-        known = system[k, size]
-        for j in range(k + 1, size):
-            known -= system[k, j] * change[j]
-        change[k] = known / system[k, k]
+        change[k] = system[k, size]
+    factorise(system)
+    solve(system, change)

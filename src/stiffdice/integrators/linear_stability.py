@@ -78,7 +78,7 @@ def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
         return Fewest(0.0, 0.0)
     mass, ground = scene.cube.mass, scene.ground
     with np.errstate(all="ignore"):  # numbers of a scene may be anything
-        decay = scene.duration / np.float64(_longest_decay(scheme))
+        decay = scene.duration / np.float64(2 * _OVERDAMPED * stability_limit(scheme, _OVERDAMPED))
         omega, zeta, _ = hardest(scene, model)
         if omega > 0 and zeta < _OVERDAMPED:
             contact = np.float64(omega) * scene.duration / stability_limit(scheme, zeta)
@@ -86,11 +86,6 @@ def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
             contact = _nodes_of_mode(scene, model, falling=False) * ground.damping / np.float64(mass) * decay
         drag = _nodes_of_mode(scene, model, falling=True) * ground.damping / np.float64(mass) * decay
     return Fewest(float(contact), float(drag) if ground.contact == "ungated" else 0.0)
-
-
-def _longest_decay(scheme: str) -> float:
-    """Return the rate times step size [1] up to which a scheme damps a speed that decays by itself."""
-    return 2 * _OVERDAMPED * stability_limit(scheme, _OVERDAMPED)
 
 
 def half_turn_steps(scene: Scene, momentum: Array) -> Array:

@@ -1,17 +1,18 @@
-"""Time-stepping schemes. A scheme is a module with TAG, LAG, FORMULA, `step` and `flight`; one line registers it.
+"""Time-stepping schemes. A scheme is a module with TAG, LAG, FORMULA and `step`; one line registers it.
 
-It may also have a `swing`, and say that what `fast_forward.py` takes at once is `proven` for it; otherwise those of
-`free_flight.py` stand for it, and its contacts are stepped. One that has a `stretch` takes steps until there is
-something to see; the others one at a time. One that does not apply to every scene and model also has
+One that takes steps of its own has a `part` in place of `step` (`adaptive_steps.py`). One that has a `swing`, for which
+the bounds of `fast_forward.py` are proven, takes many steps of a contact at once. One that has a `stretch` takes steps
+until there is something to see; the others one at a time. One that does not apply to every scene and model also has
 `unfit(scene, model)`, which says why not.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
-from stiffdice.dynamics.compilation import by_tag, njit
+from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.errors import InputError
 from stiffdice.integrators import (
     adaptive_steps,
@@ -40,14 +41,18 @@ SCHEMES = {name: module.TAG for name, module in _MODULES.items()}
 FORMULAS: dict[str, str] = {name: module.FORMULA for name, module in _MODULES.items()}
 
 
-def _chosen(part: str, *otherwise: Any) -> Callable[..., Any]:
-    """Return the function of this name that a scheme has, or what is to stand for it, chosen by the scheme's tag."""
-    return by_tag({type(module.TAG): getattr(module, part, *otherwise) for module in _MODULES.values()})
+def _chosen(of: Callable[[Any], Any]) -> Callable[..., Any]:
+    """Return the function `of` a scheme's module, chosen by the scheme's tag."""
+    return by_tag({type(module.TAG): of(module) for module in _MODULES.values()})
+
+
+def _step_of(module: Any) -> Any:
+    return adaptive_steps.whole(module.part) if hasattr(module, "part") else module.step
 
 
 # (scheme, model, law, physics, state, h, tolerance) -> force evaluations, or pieces in closed form: advance `state` by
 # one step of h [s]. Only a scheme that controls its own error looks at the tolerance [1] of it.
-step = _chosen("step")
+step = _chosen(_step_of)
 
 
 def _whole(module: Any) -> Any:
@@ -94,15 +99,15 @@ stretch = by_tag(
 )
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
-flight = _chosen("flight")
+flight = _chosen(lambda module: free_flight.lagging(module.LAG))
 
 # (scheme, place, speed, h, steps, square, rate, constant) -> the change of place and the new speed after so many steps
 # at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off; both
 # not-a-number where that is not known.
-swing = _chosen("swing", free_flight.swing)
+swing = _chosen(lambda module: getattr(module, "swing", constant((math.nan, math.nan))))
 
 # (scheme) -> whether the bounds of `fast_forward.py`, for how long a phase lasts and what stays at rest, hold for it.
-proven = _chosen("proven", free_flight.proven)
+proven = _chosen(lambda module: constant(hasattr(module, "swing")))
 
 # What a scheme that controls its own error aims at, relative to the motion, unless told otherwise.
 TOLERANCE = 1e-9

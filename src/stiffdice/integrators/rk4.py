@@ -1,11 +1,10 @@
 """The classical Runge-Kutta scheme of order four, its rotations by the method of Munthe-Kaas.
 
-Place and momenta are advanced as ever (Kutta 1901; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations
-I, II.1). The orientation is exp(θ) times that at the step's begin, so that the cube stays rigid, and the scheme is that
-of the rotation vector: θ' = ω − θ × ω/2 + θ × (θ × ω)/12, what order four needs of dexp⁻¹ (Munthe-Kaas 1999, Appl.
-Numer. Math. 29, 115; Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). θ' = ω while the spin keeps
-its direction: a free flight is exact. An undamped oscillator is stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in
-a small step (Hairer and Wanner, II, IV.2).
+Place and momenta: Kutta 1901; Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, II.1. The
+orientation is exp(θ) times that at the step's begin, so that the cube stays rigid, with
+θ' = ω − θ × ω/2 + θ × (θ × ω)/12, what order four needs of dexp⁻¹ (Munthe-Kaas 1999, Appl. Numer. Math. 29, 115;
+Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). A free flight is exact. An undamped oscillator is
+stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in a small step (Hairer and Wanner, II, IV.2).
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import STATE, Motion, Physics
-from stiffdice.integrators import free_flight
+from stiffdice.integrators.free_flight import plus, scaled
 
 
 class RK4(NamedTuple):
@@ -51,7 +50,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
         if far > 0.0:
             _advance(model, physics, begin, state, motion, force, far * h)
         force, motion = _slope(model, law, physics, state, motion, far * h)
-        mean_force, mean_motion = _sum(mean_force, force, weight), _sum(mean_motion, motion, weight)
+        mean_force, mean_motion = plus(mean_force, force, weight), plus(mean_motion, motion, weight)
     _advance(model, physics, begin, state, mean_motion, mean_force, h)
     return len(_STAGES)
 
@@ -66,7 +65,7 @@ def _advance(
     state.velocity[:] = start.velocity
     state.angular_momentum[:] = start.angular_momentum
     state.node_offset[:] = start.node_offset
-    models.move(model, state, _scaled(motion, h))
+    models.move(model, state, scaled(motion, h))
     models.kick(model, physics, state, force, h)
 
 
@@ -79,27 +78,3 @@ def _slope(model: Any, law: Any, physics: Physics, state: Any, taken: Motion, h:
     bx, by, bz = ty * az - tz * ay, tz * ax - tx * az, tx * ay - ty * ax
     rx, ry, rz = wx - ax / 2 + bx / 12, wy - ay / 2 + by / 12, wz - az / 2 + bz / 12
     return models.force(model, law, physics, state), (ux, uy, uz, rx, ry, rz)
-
-
-@njit
-def _scaled(a: Motion, by: float) -> Motion:
-    return by * a[0], by * a[1], by * a[2], by * a[3], by * a[4], by * a[5]
-
-
-@njit
-def _sum(a: Motion, b: Motion, weight: float) -> Motion:
-    """Return a + weight·b."""
-    return (
-        a[0] + weight * b[0],
-        a[1] + weight * b[1],
-        a[2] + weight * b[2],
-        a[3] + weight * b[3],
-        a[4] + weight * b[4],
-        a[5] + weight * b[5],
-    )
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight, on the parabola itself and at the spin that it keeps."""
-    free_flight.flight(model, physics, state, h, steps, LAG)

@@ -17,12 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics import compilation
-from stiffdice.dynamics.contact import LAWS, acts, swing_square
+from stiffdice.dynamics.contact import LAWS, acts, push, swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.simd import bits, lane, load, of_three, total
 from stiffdice.dynamics.state import Physics, States, physics_of, start_of
-from stiffdice.integrators.batched_kernel import push
 from stiffdice.scene import validation
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene

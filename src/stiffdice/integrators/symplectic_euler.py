@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators import free_flight, swift
+from stiffdice.integrators import swift
 
 
 class SymplecticEuler(NamedTuple):
@@ -40,18 +40,6 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
 
 # The same steps, faster, and as many as there is nothing to see in.
 stretch = swift.stretch
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight: u_n = u_0 + n h a, x_n = x_0 + n h u_0 + h² a n(n + 1)/2."""
-    free_flight.flight(model, physics, state, h, steps, LAG)
-
-
-@njit
-def proven() -> bool:
-    """Return that what `fast_forward.py` says of a scheme is proven for this one."""
-    return True
 
 
 @njit

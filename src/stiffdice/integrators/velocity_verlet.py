@@ -14,10 +14,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators import free_flight
+from stiffdice.integrators.free_flight import plus
 
 
 class VelocityVerlet(NamedTuple):
@@ -44,16 +43,5 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.drift(model, physics, state, h)
     models.kick(model, physics, state, old, h / 2)
     new = models.force(model, law, physics, state)
-    models.kick(model, physics, state, _difference(new, old), h / 2)
+    models.kick(model, physics, state, plus(new, old, -1.0), h / 2)
     return 2
-
-
-@njit
-def _difference(a: Wrench, b: Wrench) -> Wrench:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5]
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight, on the parabola itself."""
-    free_flight.flight(model, physics, state, h, steps, LAG)

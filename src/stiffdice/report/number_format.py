@@ -1,17 +1,20 @@
-"""What was run, in one line under a figure, from the attributes of its file."""
+"""Numbers as a person writes them, and what was run, in one line under a figure."""
 
 from __future__ import annotations
 
 import json
 import math
+from typing import Any
 
 import xarray as xr
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_GROUND = {"stiffness": "S = {} kg/s²", "damping": "D = {} kg/s", "friction": "μ = {}"}
 
 
-def readable(value: float) -> str:
-    """Return a number as a person writes it: 10⁶, 2.5×10⁴, 0.075."""
+def readable(value: float, digits: int | None = None) -> str:
+    """Return a number as a person writes it: 10⁶, 2.5×10⁴, 0.075; rounded first, if digits are given."""
+    value = value if digits is None else float(f"{value:.{digits}g}")
     if value == 0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:g}"
     exponent = math.floor(math.log10(abs(value)))
@@ -20,12 +23,29 @@ def readable(value: float) -> str:
     return power if mantissa == "1" else f"{mantissa}×{power}"
 
 
+def duration(seconds: float) -> str:
+    """Return a time in its unit, from ns to s."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def scene_of(found: xr.Dataset) -> dict[str, Any]:
+    """Return the scene of a dataset, as plain data."""
+    return dict(json.loads(found.attrs["scene"]))
+
+
+def ground_words(**numbers: float) -> str:
+    """Return numbers of a ground with their letters and units: S = 10⁶ kg/s², D = 0.1 kg/s, μ = 0.1."""
+    return ", ".join(_GROUND[name].format(readable(value)) for name, value in numbers.items())
+
+
 def describe(run: xr.Dataset, *, law: bool = False) -> str:
     """Return model, scheme, steps and ground of a run, and its contact law if asked, in one line with units."""
-    ground = json.loads(run.attrs["scene"])["ground"]
+    ground = scene_of(run)["ground"]
     contact = f", {ground['contact']}" if law else ""
     return (
         f"{run.attrs['model']}, {run.attrs['scheme'].replace('_', ' ')}, {int(run.attrs['steps']):,} steps "
-        f"(ωh = {run.attrs['omega_h']:.3g}); S = {readable(ground['stiffness'])} kg/s², "
-        f"D = {readable(ground['damping'])} kg/s, μ = {readable(ground['friction'])}{contact}"
+        f"(ωh = {run.attrs['omega_h']:.3g}); {ground_words(**{name: ground[name] for name in _GROUND})}{contact}"
     )

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from stiffdice.errors import InputError
-from stiffdice.scene import validation
+from stiffdice.scene import flat_landing, validation
 
-CONTACT_LAWS = ("ungated", "gated")
+CONTACT_LAWS = tuple(flat_landing.APPROACH_DAMPING)
 
 
 @dataclass(frozen=True)

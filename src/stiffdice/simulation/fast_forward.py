@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import Gated, Ungated, height_of, lowest_of, reaches, speed_of, swing_square
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import drags, height_of, lowest_of, reaches, speed_of, swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.integrators import registry as schemes
@@ -36,23 +36,16 @@ def lost(sight: Any) -> bool:
 
 
 @njit
-def _rising(model: Any, speed: float, sight: Any) -> float:
-    """Ungated: the force on a node is zero as long as it rises, which is known of all only where none turns."""
-    if not models.touches(model):
+def _undisturbed(model: Any, law: Any, speed: float, sight: Any) -> float:
+    """Return for how many steps a body in the air at this speed along the normal [m/s] feels nothing.
+
+    Under a law that drags on falling nodes that is as long as all rise, which is known only where none turns.
+    """
+    if not (drags(law) and models.touches(model)):
         return math.inf
     if models.turns(model) or speed < 0.0:
         return 0.0
     return speed / (sight.step_size * sight.pull) if sight.pull > 0.0 else math.inf
-
-
-@njit
-def _always(model: Any, speed: float, sight: Any) -> float:
-    """Gated: a node above the ground feels nothing."""
-    return math.inf
-
-
-# (law, model, speed, sight) -> for how many steps a body in the air at this speed along the normal [m/s] feels nothing.
-_undisturbed = by_tag({Ungated: _rising, Gated: _always})
 
 
 @njit
@@ -80,7 +73,7 @@ def free_steps(model: Any, law: Any, physics: Physics, state: Any, sight: Any, m
     margin = 4 * h * (abs(sight.speed) + h * abs(sight.pull))
     room = sight.height - models.extent(model, physics, state) - margin
     steps = _until(room, sight.speed - h * sight.pull, sight.pull, h) if room > 0.0 else 0.0
-    undisturbed = _undisturbed(law, model, sight.speed, sight)
+    undisturbed = _undisturbed(model, law, sight.speed, sight)
     steps = min(steps, undisturbed)
     if models.turns(model) and steps < most and undisturbed > steps:
         steps = max(steps, _turning(physics, state, sight, margin))

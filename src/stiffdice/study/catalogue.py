@@ -57,11 +57,15 @@ DRAWINGS: dict[str, Entry] = {
     "work-energy": Entry(
         "stiffdice.report.figures.work_precision", "energy", "experiments", "work-precision", timed=True
     ),
-    "cost": Entry("stiffdice.report.figures.cost", "position", "experiments", "work-precision", timed=True),
-    "cost-restitution": Entry(
-        "stiffdice.report.figures.cost", "restitution", "experiments", "work-precision", timed=True
+    "cost": Entry(
+        "stiffdice.report.figures.work_precision", "cost_position", "experiments", "work-precision", timed=True
     ),
-    "cost-energy": Entry("stiffdice.report.figures.cost", "energy", "experiments", "work-precision", timed=True),
+    "cost-restitution": Entry(
+        "stiffdice.report.figures.work_precision", "cost_restitution", "experiments", "work-precision", timed=True
+    ),
+    "cost-energy": Entry(
+        "stiffdice.report.figures.work_precision", "cost_energy", "experiments", "work-precision", timed=True
+    ),
     "engine-limits": Entry("stiffdice.report.figures.engines.limits", "draw", "experiments", "engine-limits"),
     "engine-throw": Entry("stiffdice.report.figures.engines.throw", "draw", "experiments", "engine-throw"),
     "engine-speed": Entry("stiffdice.report.figures.engines.speed", "draw", "timings", "engine-speed"),

@@ -18,7 +18,7 @@ from stiffdice.experiments.work_precision.effort import (
     chosen_from,
     fixed_step,
     ladder,
-    lead,
+    lag_time,
     methods_for,
     path_of,
     plain,
@@ -79,7 +79,7 @@ def test_an_engine_named_goes_up_the_ladder_of_a_fixed_step():
     with pytest.raises(InputError, match="methods = scipy: allowed is symplectic_euler or"):
         chosen_from(FLAT, ["scipy"])
     assert [*ladder(scene, "numpy", 2, 1e5)] == [*ladder(scene, "symplectic_euler", 2, 1e5)]
-    assert lead(scene, "numpy", effort) == lead(scene, "symplectic_euler", effort) > 0
+    assert lag_time(scene, "numpy", effort) == lag_time(scene, "symplectic_euler", effort) > 0
     theirs, ours = (path_of(FLAT, scene, name, effort, 10**6) for name in ("numpy", "symplectic_euler"))
     np.testing.assert_allclose(theirs.states["position"], ours.states["position"], rtol=0, atol=1e-12)
     assert theirs.computed == theirs.evaluations == ours.evaluations == 120

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
-from stiffdice.experiments.work_precision.effort import Effort, lead, path_of
+from stiffdice.experiments.work_precision.effort import Effort, lag_time, path_of
 from stiffdice.experiments.work_precision.problems import MEASURES, PROBLEMS, SAMPLES, Judge, scene_of, touchdown
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines import registry as engines
@@ -93,7 +93,7 @@ def test_a_scheme_whose_velocity_lags_is_judged_by_its_path():
     steps = SAMPLES * round(linear_theory.steps_for(scene, 0.4) / SAMPLES)
     effort = Effort(steps, np.nan)
     path = path_of(flat, scene, "symplectic_euler", effort, 10**6)
-    found = judge.errors(path.states, lead(scene, "symplectic_euler", effort))["restitution"]
+    found = judge.errors(path.states, lag_time(scene, "symplectic_euler", effort))["restitution"]
     wanted = simulate(scene, model="sliding", steps=steps).measures["restitution_error"][0]
     assert wanted > 1e-4
     assert found == pytest.approx(wanted, rel=1e-6)

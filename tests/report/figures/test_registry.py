@@ -8,7 +8,6 @@ import pytest
 from matplotlib.animation import FuncAnimation
 from PIL import Image
 
-from stiffdice.report import number_format
 from stiffdice.report.figures import cube, style
 from stiffdice.report.figures import registry as figures
 from stiffdice.scene.scene import from_mapping
@@ -179,21 +178,6 @@ def test_each_sweep_has_its_columns_and_each_criterion_its_look(data):
     for words in ("airborne energy ≤ 1.05 E₀", "apex ≤ 1.02 × the one before, from 0.1 m on"):
         assert f"first pass: {words}" in labels
         assert f"last fail: {words}" in labels
-
-
-def test_the_note_under_a_figure_says_what_was_run():
-    run = dataset("sliding", "as_listed", ground={"stiffness": 1e5, "damping": 0.3, "friction": 0.4})
-    assert number_format.describe(run) == (
-        "sliding, symplectic euler, 3,000 steps (ωh = 2.11); S = 10⁵ kg/s², D = 0.3 kg/s, μ = 0.4"
-    )
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(1e6, "10⁶"), (2.5e4, "2.5×10⁴"), (0.075, "0.075"), (0, "0"), (1e-6, "10⁻⁶"), (9999, "9999"), (1e-3, "0.001")],
-)
-def test_numbers_are_written_as_people_do(value, text):
-    assert number_format.readable(value) == text
 
 
 def test_an_energy_that_rises_is_seen(data):

@@ -8,7 +8,7 @@ from stiffdice.experiments.work_precision import time as work_precision_time
 from stiffdice.experiments.work_precision.effort import STEPPING
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import effort_ladder, style
+from stiffdice.report.figures import method_looks, style
 from stiffdice.report.figures import registry as figures
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines.registry import PEERS, SOLVERS
@@ -89,7 +89,7 @@ def test_the_floor_is_drawn_and_within_the_axes(data):
 
 def test_times_that_were_not_taken_are_hollow(data, timings):
     panel = drawn("work-precision", data | timings).axes[0]
-    look = effort_ladder.look("symplectic_euler")
+    look = method_looks.look("symplectic_euler")
     marks = [
         line
         for line in panel.get_lines()
@@ -115,7 +115,7 @@ def test_the_cost_is_drawn_with_the_papers_law_beside(data):
 
 def test_every_method_has_a_look_of_its_own():
     looks = {
-        (effort_ladder.look(name)["color"], effort_ladder.look(name)["marker"])
+        (method_looks.look(name)["color"], method_looks.look(name)["marker"])
         for name in [*SCHEMES, *SOLVERS, *STEPPING]
     }
     assert len(looks) == len(SCHEMES) + len(SOLVERS) + len(STEPPING)

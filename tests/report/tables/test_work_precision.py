@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from stiffdice.experiments import layout
-from stiffdice.report.tables.work_precision import cost_of, duration, found_in, table, targets
+from stiffdice.report.tables.work_precision import cost_of, found_in, table, targets
 
 COSTS = np.array([1e2, 1e3, 1e4, 1e5, 1e6])
 
@@ -66,13 +66,6 @@ def test_rungs_without_a_cost_are_left_out():
     found = cost([1e-2, 1e-9, 1e-4, 1e-9, 1e-9], costs=costs)
     assert found == (pytest.approx(1e3), True, 1e4)
     assert np.isnan(cost([1.0], costs=np.array([np.nan]))).any()
-
-
-@pytest.mark.parametrize(
-    ("seconds", "told"), [(12.34, "12.3 s"), (0.5, "500 ms"), (2.5e-5, "25 µs"), (3e-9, "3 ns"), (np.nan, "nan ns")]
-)
-def test_a_time_is_told_in_its_unit(seconds, told):
-    assert duration(seconds) == told
 
 
 def made(problem, methods, tolerance, errors, evaluations, seconds):

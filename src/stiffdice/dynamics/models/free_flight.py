@@ -16,24 +16,11 @@ class Flying(NamedTuple):
 
 TAG = Flying()
 
-# No torque ever changes the spin.
-kick = sliding.kick
-motion = tumbling.motion
-move = tumbling.move
+kick = sliding.kick  # no torque ever changes the spin
 drift = tumbling.drift
-turn = tumbling.turn
-turns = tumbling.turns
-extent = tumbling.extent
-rises_only = tumbling.rises_only
 
 
 @njit
 def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the weight [N]: there is no ground."""
     return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-
-
-@njit
-def touches() -> bool:
-    """Return that the ground never acts on the body."""
-    return False

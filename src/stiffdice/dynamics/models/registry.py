@@ -1,11 +1,19 @@
-"""Which motion is computed. A model is a module with the functions below and TAG; one line registers it."""
+"""Which motion is computed. A model is a module with TAG, `force`, `kick` and `drift`; one line registers it.
+
+What turns the cube, and what the ground touches, is said in `state.py`. A module whose motion is along the vertical
+alone has RISES_ONLY = True.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
-from stiffdice.dynamics.compilation import by_tag
+from stiffdice.dynamics.compilation import by_tag, constant, njit
+from stiffdice.dynamics.contact import lowest_of
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
+from stiffdice.dynamics.state import TOUCHING, TURNING, Motion, Physics
 
 _MODULES: dict[str, Any] = {
     "vertical": vertical,
@@ -16,32 +24,59 @@ _MODULES: dict[str, Any] = {
 
 MODELS = {name: module.TAG for name, module in _MODULES.items()}
 
+
+def _chosen(part: str) -> Callable[..., Any]:
+    return by_tag({type(module.TAG): getattr(module, part) for module in _MODULES.values()})
+
+
 # (model, law, physics, state) -> force [N] and torque [N m] on the body in this state.
-force = by_tag({type(module.TAG): module.force for module in _MODULES.values()})
+force = _chosen("force")
 
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
-kick = by_tag({type(module.TAG): module.kick for module in _MODULES.values()})
+kick = _chosen("kick")
 
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
-drift = by_tag({type(module.TAG): module.drift for module in _MODULES.values()})
-
-# (model, physics, state) -> the velocity [m/s] and the spin [rad/s] at which place and orientation change.
-motion = by_tag({type(module.TAG): module.motion for module in _MODULES.values()})
-
-# (model, state, shift): shift place by the first three [m], and turn the body by the rotation vector of the rest [rad].
-move = by_tag({type(module.TAG): module.move for module in _MODULES.values()})
-
-# (model, physics, state, duration): turn the body at its present spin for so long [s], as in a free flight.
-turn = by_tag({type(module.TAG): module.turn for module in _MODULES.values()})
+drift = _chosen("drift")
 
 # (model) -> whether the body turns.
-turns = by_tag({type(module.TAG): module.turns for module in _MODULES.values()})
+turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
 
 # (model) -> whether the ground can act on the body.
-touches = by_tag({type(module.TAG): module.touches for module in _MODULES.values()})
+touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
 
 # (model) -> whether the body moves up and down only, on level ground, so that friction has nothing to act on.
-rises_only = by_tag({type(module.TAG): module.rises_only for module in _MODULES.values()})
+rises_only = by_tag({type(module.TAG): constant(getattr(module, "RISES_ONLY", False)) for module in _MODULES.values()})
 
-# (model, physics, state) -> how far below the centre a node can be in a free flight from this state on [m].
-extent = by_tag({type(module.TAG): module.extent for module in _MODULES.values()})
+
+@njit
+def turn(model: Any, physics: Physics, state: Any, duration: float) -> None:
+    """Turn the body at its present spin for so long [s], as in a free flight."""
+    if turns(model):
+        tumbling.turn(physics, state, duration)
+
+
+@njit
+def motion(model: Any, physics: Physics, state: Any) -> Motion:
+    """Return the velocity [m/s] and the spin [rad/s] at which place and orientation change."""
+    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    if not turns(model):
+        return ux, uy, uz, 0.0, 0.0, 0.0
+    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
+    return ux, uy, uz, lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
+
+
+@njit
+def move(model: Any, state: Any, shift: Any) -> None:
+    """Shift the place by the first three [m], and turn the body by the rotation vector of the other three [rad]."""
+    for axis in range(3):
+        state.position[axis] += shift[axis]
+    ax, ay, az = shift[3], shift[4], shift[5]
+    angle = math.sqrt(ax * ax + ay * ay + az * az)
+    if turns(model) and angle > 0.0:
+        tumbling.rotate(state, ax / angle, ay / angle, az / angle, angle)
+
+
+@njit
+def extent(model: Any, physics: Physics, state: Any) -> float:
+    """Return how far below the centre a node can be in a free flight from this state on [m]."""
+    return physics.reach if turns(model) else lowest_of(physics, state)

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench, normal_force, reaches
-from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Physics
 
 
@@ -20,13 +19,7 @@ class Vertical(NamedTuple):
 
 TAG = Vertical()
 
-# Its launch has no velocity along the ground, and nothing gives it one.
-motion = sliding.motion
-move = sliding.move
-turn = sliding.turn
-turns = sliding.turns
-touches = sliding.touches
-extent = sliding.extent
+RISES_ONLY = True
 
 
 @njit
@@ -38,8 +31,7 @@ def force(law: Any, physics: Physics, state: Any) -> Wrench:
     nodes = state.node_offset
     fz = 0.0
     for k in range(nodes.shape[0]):
-        push = normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping)
-        fz += push - physics.node_weight
+        fz += normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping) - physics.node_weight
     return 0.0, 0.0, fz, 0.0, 0.0, 0.0
 
 
@@ -53,9 +45,3 @@ def kick(physics: Physics, state: Any, wrench: Wrench, h: float) -> None:
 def drift(physics: Physics, state: Any, h: float) -> None:
     """Advance the height by h [s] at the state's velocity (equation 7)."""
     state.position[2] += h * state.velocity[2]
-
-
-@njit
-def rises_only() -> bool:
-    """Return that the body moves up and down only."""
-    return True

@@ -124,7 +124,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
     return Path(states_of(run, SAMPLES), round(stages * effort.steps), computed)
 
 
-def lead(scene: Scene, method: str, effort: Effort) -> float:
+def lag_time(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
     return stepper.lag(method) * scene.duration / effort.steps if fixed_step(method) else 0.0
 

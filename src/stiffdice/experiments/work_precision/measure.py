@@ -141,7 +141,7 @@ def _climbed(
             if rungs or too_dear == _TRIES:
                 break
             continue
-        errors = judge.errors(path.states, efforts.lead(scene, method, effort))
+        errors = judge.errors(path.states, efforts.lag_time(scene, method, effort))
         rungs.append(
             effort._asdict()
             | {f"{name}_error": error for name, error in errors.items()}

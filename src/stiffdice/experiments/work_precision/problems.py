@@ -100,31 +100,31 @@ class Judge:
         self._end_energy = float(_energy(scene, reference[-1:])[0])
         self._restitution = self._speeds(reference, 0.0)
 
-    def errors(self, states: States, lead: float = 0.0) -> dict[str, float]:
+    def errors(self, states: States, lag_time: float = 0.0) -> dict[str, float]:
         """Return the error by each of MEASURES; not-a-number where a run left the range of doubles.
 
-        lead [s]: by how much the velocity is behind the place, as the scheme's LAG says.
+        lag_time [s]: by how much the velocity is behind the place, as the scheme's LAG says.
         """
         with np.errstate(all="ignore"):
             away = states["position"] - self._reference["position"]
             found = {
                 "position": math.sqrt(float(np.mean((away**2).sum(axis=1)))) / self._scene.cube.radius,
-                "restitution": self._restitution_error(states, lead),
+                "restitution": self._restitution_error(states, lag_time),
                 "energy": abs(float(_energy(self._scene, states[-1:])[0]) - self._end_energy) / self._launch_energy,
             }
         return {name: value if math.isfinite(value) else math.nan for name, value in found.items()}
 
-    def _restitution_error(self, states: States, lead: float) -> float:
-        down, up = self._speeds(states, lead)
+    def _restitution_error(self, states: States, lag_time: float) -> float:
+        down, up = self._speeds(states, lag_time)
         if self._problem.turns:
             wanted_down, wanted_up = self._restitution
             return abs(up / down - wanted_up / wanted_down)
         return abs(up / down - flat_bounce.restitution(self._scene, down)) if 0 < down < math.inf else math.nan
 
-    def _speeds(self, states: States, lead: float) -> tuple[float, float]:
+    def _speeds(self, states: States, lag_time: float) -> tuple[float, float]:
         """Return the centre's speed down and up [m/s] at the height of the first touch, on the flights' parabolas."""
         known = states[[0, self._after]]
-        slopes = known["velocity"][:, 2] - lead * self._scene.gravity
+        slopes = known["velocity"][:, 2] - lag_time * self._scene.gravity
         squares = slopes**2 + 2 * self._scene.gravity * (known["position"][:, 2] - self._height)
         down, up = np.sqrt(np.maximum(squares, 0.0)).tolist()
         return down, up

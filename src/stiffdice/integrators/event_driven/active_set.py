@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import Gated, Ungated
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import split, upward
 from stiffdice.dynamics.state import Physics
 
 # Parts of a motion, 13, and as many more as make it whole vectors of the processor.
@@ -32,20 +32,6 @@ SWITCHES = 2 * NODES  # depth and force of node k are 2k and 2k + 1
 
 # Units in the last place of the height, and of a speed, within which a switch is taken for zero.
 _ULPS = 8 * 2.0**-52
-
-
-@njit
-def _dragged() -> bool:
-    return True
-
-
-@njit
-def _left_alone() -> bool:
-    return False
-
-
-# (law) -> whether the ground pushes a node above it, too, if it falls.
-drags = by_tag({Ungated: _dragged, Gated: _left_alone})
 
 
 @njit
@@ -84,6 +70,18 @@ def node_of(
 
 
 @njit
+def contact_of(
+    turning: bool, physics: Physics, nodes: Any, motion: Any, k: int
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """Return node k's place relative to the centre [m], clearance [m], speed along the normal, and slip [m/s]."""
+    height = upward(physics, motion[0], motion[1], motion[2])
+    rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
+    clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
+    speed, sx, sy, sz = split(physics, vx, vy, vz)
+    return rx, ry, rz, clearance, speed, sx, sy, sz
+
+
+@njit
 def push_of(physics: Physics, bits: int, clearance: float, speed: float) -> float:
     """Return the normal force [N] on a node that is pushed; clearance [m], speed [m/s]: away from the ground."""
     push = -physics.damping * speed
@@ -97,14 +95,11 @@ def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion:
     nodes [m]: shape (8, 3), before they are turned. regime: bits of each node, shape (8,).
     """
     fx = fy = fz = tx = ty = tz = 0.0
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
     for k in range(NODES):
         if regime[k] & PUSHED == 0:
             continue
-        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-        push = push_of(physics, regime[k], height + physics.nx * rx + physics.ny * ry + physics.nz * rz, speed)
-        sx, sy, sz = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
+        rx, ry, rz, clearance, speed, sx, sy, sz = contact_of(turning, physics, nodes, motion, k)
+        push = push_of(physics, regime[k], clearance, speed)
         grip = physics.friction * push / (math.sqrt(sx * sx + sy * sy + sz * sz) + physics.cutoff)
         gx = push * physics.nx - grip * sx
         gy = push * physics.ny - grip * sy
@@ -122,11 +117,16 @@ def derivative(turning: bool, physics: Physics, nodes: Any, regime: Any, motion:
     if turning:
         rate[6], rate[7], rate[8] = tx, ty, tz
         x, y, z = motion[6] / physics.inertia / 2, motion[7] / physics.inertia / 2, motion[8] / physics.inertia / 2
-        a, b, c, d = motion[9], motion[10], motion[11], motion[12]
-        rate[9] = -x * b - y * c - z * d
-        rate[10] = x * a + y * d - z * c
-        rate[11] = y * a + z * b - x * d
-        rate[12] = z * a + x * c - y * b
+        turned = motion[9], motion[10], motion[11], motion[12]
+        rate[9], rate[10], rate[11], rate[12] = quaternion_rate(x, y, z, *turned)
+
+
+@njit
+def quaternion_rate(
+    x: float, y: float, z: float, a: float, b: float, c: float, d: float
+) -> tuple[float, float, float, float]:
+    """Return the product of half a spin (0, x, y, z) [rad/s] and a quaternion (a, b, c, d)."""
+    return -x * b - y * c - z * d, x * a + y * d - z * c, y * a + z * b - x * d, z * a + x * c - y * b
 
 
 @njit
@@ -145,9 +145,9 @@ def switches(
 
     Depths in m; forces in N. A switch that nothing hangs on is 1 for ever.
     """
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
-    centre_speed = physics.nx * motion[3] + physics.ny * motion[4] + physics.nz * motion[5]
-    centre_gain = physics.nx * rate[3] + physics.ny * rate[4] + physics.nz * rate[5]
+    height = upward(physics, motion[0], motion[1], motion[2])
+    centre_speed = upward(physics, motion[3], motion[4], motion[5])
+    centre_gain = upward(physics, rate[3], rate[4], rate[5])
     lx, ly, lz, sx, sy, sz, gx, gy, gz = _normals(turning, physics, motion, rate)
     for k in range(NODES):
         a, b, c = nodes[k, 0], nodes[k, 1], nodes[k, 2]
@@ -220,11 +220,8 @@ def passes(regime: Any, switch: int) -> bool:
 @njit
 def begin(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: Any, regime: Any, small: Any) -> None:
     """Set the regime that a motion is in; small: from `vanishing`."""
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
     for k in range(NODES):
-        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-        clearance = height + physics.nx * rx + physics.ny * ry + physics.nz * rz
-        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        _, _, _, clearance, speed, _, _, _ = contact_of(turning, physics, nodes, motion, k)
         # A node that is about at the ground is on the side to which it goes.
         touching = abs(clearance) <= small[0]
         below = speed < 0.0 if touching else clearance < 0.0
@@ -247,8 +244,7 @@ def cross(turning: bool, dragging: bool, physics: Physics, nodes: Any, motion: A
     if switch % 2:
         regime[k] ^= PUSHED
         return
-    _, _, _, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-    speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+    speed = contact_of(turning, physics, nodes, motion, k)[4]
     regime[k] = _answers(dragging, physics, regime[k] & BELOW == 0, 0.0, speed)
 
 
@@ -300,13 +296,12 @@ def hardness(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: A
     contact's motion along the normal: the fastest node's, or what its depth or the weight stands for.
     """
     square = rubbing = speed_most = depth_most = 0.0
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    height = upward(physics, motion[0], motion[1], motion[2])
     for k in range(NODES):
         if regime[k] == 0:
             continue
         rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-        level = physics.nx * rx + physics.ny * ry + physics.nz * rz
-        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
+        level, speed = upward(physics, rx, ry, rz), upward(physics, vx, vy, vz)
         pliancy = 1.0 / physics.mass
         arm = rx * rx + ry * ry + rz * rz
         along = pliancy + (arm - level * level) / physics.inertia if turning else pliancy

@@ -18,7 +18,7 @@ from stiffdice.integrators.event_driven.active_set import SIZE, derivative
 STAGES = 12
 ORDER = 8
 
-# (stage, earlier stage, coefficient), those that are not zero.
+# (row, stage, coefficient), those that are not zero: a row for each stage, then the step's, then the error's.
 _COEFFICIENTS = (
     (1, 0, 0.05260015195876773),
     (2, 0, 0.0197250569845379),
@@ -70,64 +70,34 @@ _COEFFICIENTS = (
     (11, 8, -8.87285693353063),
     (11, 9, 12.360567175794303),
     (11, 10, 0.6433927460157636),
+    (12, 0, 0.054293734116568765),
+    (12, 5, 4.450312892752409),
+    (12, 6, 1.8915178993145003),
+    (12, 7, -5.801203960010585),
+    (12, 8, 0.3111643669578199),
+    (12, 9, -0.1521609496625161),
+    (12, 10, 0.20136540080403034),
+    (12, 11, 0.04471061572777259),
+    (13, 0, 0.01312004499419488),
+    (13, 5, -1.2251564463762044),
+    (13, 6, -0.4957589496572502),
+    (13, 7, 1.6643771824549864),
+    (13, 8, -0.35032884874997366),
+    (13, 9, 0.3341791187130175),
+    (13, 10, 0.08192320648511571),
+    (13, 11, -0.022355307863886294),
 )
 
-# Stage i is evaluated at y + h Σ_j COUPLING[i, j] k_j.
-COUPLING = np.zeros((STAGES, STAGES))
-for _stage, _earlier, _value in _COEFFICIENTS:
-    COUPLING[_stage, _earlier] = _value
+_TABLE = np.zeros((STAGES + 2, STAGES))
+for _row, _stage, _value in _COEFFICIENTS:
+    _TABLE[_row, _stage] = _value
 
-# The step is h Σ_i WEIGHTS[i] k_i.
-WEIGHTS = np.array(
-    [
-        0.054293734116568765,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        4.450312892752409,
-        1.8915178993145003,
-        -5.801203960010585,
-        0.3111643669578199,
-        -0.1521609496625161,
-        0.20136540080403034,
-        0.04471061572777259,
-    ]
-)
+# Stage i is evaluated at y + h Σ_j COUPLING[i, j] k_j, and the step is h Σ_i WEIGHTS[i] k_i.
+COUPLING, WEIGHTS = _TABLE[:STAGES], _TABLE[STAGES]
 
 # h Σ_i ERROR_5[i] k_i and h Σ_i ERROR_3[i] k_i estimate the errors of embedded methods of order 5 and 3.
-ERROR_5 = np.array(
-    [
-        0.01312004499419488,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        -1.2251564463762044,
-        -0.4957589496572502,
-        1.6643771824549864,
-        -0.35032884874997366,
-        0.3341791187130175,
-        0.08192320648511571,
-        -0.022355307863886294,
-    ]
-)
-ERROR_3 = np.array(
-    [
-        -0.18980075407240762,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        4.450312892752409,
-        1.8915178993145003,
-        -5.801203960010585,
-        -0.4226823213237919,
-        -0.1521609496625161,
-        0.20136540080403034,
-        0.02265179219836082,
-    ]
-)
+ERROR_5, ERROR_3 = _TABLE[STAGES + 1], WEIGHTS.copy()
+ERROR_3[[0, 8, 11]] -= 0.24409448818897638, 0.7338466882816118, 0.022058823529411766
 
 
 @njit

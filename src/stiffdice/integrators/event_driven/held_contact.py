@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import upward
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.event_driven.active_set import BELOW, NODES, PUSHED, node_of, push_of
+from stiffdice.integrators.event_driven.active_set import BELOW, NODES, PUSHED, contact_of, push_of
 
 
 @njit
@@ -27,9 +28,7 @@ def slips(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any,
 
 @njit
 def _slip_of(turning: bool, physics: Physics, nodes: Any, motion: Any, k: int, slip: Any) -> None:
-    _, _, _, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-    speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-    slip[0], slip[1], slip[2] = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
+    _, _, _, _, _, slip[0], slip[1], slip[2] = contact_of(turning, physics, nodes, motion, k)
 
 
 @njit
@@ -84,14 +83,11 @@ def retouch(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: An
 def straighten(turning: bool, physics: Physics, nodes: Any, regime: Any, motion: Any, about: Any, rate: Any) -> None:
     """Change a motion's rate to what it were, were friction by its tangent at the slips `about`, shape (8, 3)."""
     slip, part, force = np.zeros(3), np.empty(3), np.empty(3)
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
     for k in range(NODES):
         if regime[k] & PUSHED == 0:
             continue
-        rx, ry, rz, vx, vy, vz = node_of(turning, physics, nodes, motion, k)
-        speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-        push = push_of(physics, regime[k], height + physics.nx * rx + physics.ny * ry + physics.nz * rz, speed)
-        slip[0], slip[1], slip[2] = vx - speed * physics.nx, vy - speed * physics.ny, vz - speed * physics.nz
+        rx, ry, rz, clearance, speed, slip[0], slip[1], slip[2] = contact_of(turning, physics, nodes, motion, k)
+        push = push_of(physics, regime[k], clearance, speed)
         _rubbing(physics, slip, about[k], part)
         long = math.sqrt(_dot(slip, slip)) + physics.cutoff
         for i in range(3):
@@ -119,17 +115,14 @@ def slopes(
             by_speed[i, j] = by_place[i, j] = 0.0
     by_velocity, by_shift, by_turn, lever = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3))
     normal, slip, force, arm, part = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    height = physics.nx * motion[0] + physics.ny * motion[1] + physics.nz * motion[2]
+    height = upward(physics, motion[0], motion[1], motion[2])
     normal[0], normal[1], normal[2] = physics.nx, physics.ny, physics.nz
     for k in range(NODES):
         if regime[k] & PUSHED == 0:
             continue
-        arm[0], arm[1], arm[2], slip[0], slip[1], slip[2] = node_of(turning, physics, nodes, motion, k)
-        speed = _dot(normal, slip)
+        arm[0], arm[1], arm[2], _, speed, slip[0], slip[1], slip[2] = contact_of(turning, physics, nodes, motion, k)
         spring = physics.stiffness if regime[k] & BELOW else 0.0
         push = -physics.damping * speed - spring * (height + _dot(normal, arm))
-        for i in range(3):
-            slip[i] -= speed * normal[i]
         grip, bend = _rubbing(physics, slip, about[k], part)
         grip, bend = physics.friction * push * grip, physics.friction * push * bend
         for i in range(3):

@@ -18,8 +18,9 @@ import numpy as np
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.event_driven.active_set import NODES, SIZE, derivative
+from stiffdice.integrators.event_driven.active_set import NODES, SIZE, derivative, quaternion_rate
 from stiffdice.integrators.event_driven.held_contact import retouch, slips, slopes, straighten
+from stiffdice.integrators.linear_equations import factorise, solve
 
 STAGES = 5
 ORDER = 7  # of the error estimate
@@ -88,7 +89,7 @@ def step(
                 slopes(turning, physics, nodes, regime, end, about[stage], by_speed[stage], by_place[stage])
         if fresh:
             _couple(by_speed, by_place, h, unknowns, factors)
-            _factorise(factors)
+            factorise(factors)
         last, correction = correction, _correct(change, rates, h, unknowns, factors, rest, scale)
         correction = max(correction, _follow(turning, physics, start, h, change, rates, scale))
         off = 0.0
@@ -123,31 +124,6 @@ def _couple(by_speed: Any, by_place: Any, h: float, unknowns: int, matrix: Any) 
 
 
 @njit
-def _factorise(matrix: Any) -> None:
-    """Set a matrix to its triangles; it needs no pivots: friction and springs are all but positive definite."""
-    size = matrix.shape[0]
-    for i in range(size):
-        for row in range(i + 1, size):
-            matrix[row, i] /= matrix[i, i]
-            factor = matrix[row, i]
-            for j in range(i + 1, size):
-                matrix[row, j] -= factor * matrix[i, j]
-
-
-@njit
-def _solve(factors: Any, right: Any) -> None:
-    """Turn the right side of linear equations into their solution."""
-    size = factors.shape[0]
-    for i in range(size):
-        for j in range(i):
-            right[i] -= factors[i, j] * right[j]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            right[i] -= factors[i, j] * right[j]
-        right[i] /= factors[i, i]
-
-
-@njit
 def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, rest: Any, scale: Any) -> float:
     """Correct the changes of the velocities by one iteration; return by how much, over what is tolerated."""
     for i in range(STAGES):
@@ -156,7 +132,7 @@ def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, res
             for j in range(STAGES):
                 total += COUPLING[i, j] * rates[j, 3 + part]
             rest[i * unknowns + part] = h * total - change[i, 3 + part]
-    _solve(factors, rest)
+    solve(factors, rest)
     most = 0.0
     for i in range(STAGES):
         for part in range(unknowns):
@@ -178,10 +154,7 @@ def _follow(turning: bool, physics: Physics, start: Any, h: float, change: Any, 
             half = 0.5 / physics.inertia
             x, y, z = half * (start[6] + moved[6]), half * (start[7] + moved[7]), half * (start[8] + moved[8])
             a, b, c, d = start[9] + moved[9], start[10] + moved[10], start[11] + moved[11], start[12] + moved[12]
-            rate[9] = -x * b - y * c - z * d
-            rate[10] = x * a + y * d - z * c
-            rate[11] = y * a + z * b - x * d
-            rate[12] = z * a + x * c - y * b
+            rate[9], rate[10], rate[11], rate[12] = quaternion_rate(x, y, z, a, b, c, d)
     most = 0.0
     for stage in range(STAGES):
         for part in range(SIZE):

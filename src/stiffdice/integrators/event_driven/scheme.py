@@ -19,10 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import drags
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators import free_flight
-from stiffdice.integrators.adaptive_steps import PART
 from stiffdice.integrators.event_driven import dop853, radau_iia
 from stiffdice.integrators.event_driven.active_set import (
     NODES,
@@ -31,7 +30,6 @@ from stiffdice.integrators.event_driven.active_set import (
     begin,
     cross,
     derivative,
-    drags,
     fastest,
     force_free,
     give,
@@ -43,6 +41,7 @@ from stiffdice.integrators.event_driven.active_set import (
     vanishing,
 )
 from stiffdice.integrators.event_driven.touchdown import free_time
+from stiffdice.integrators.free_flight import flight
 
 
 class Event(NamedTuple):
@@ -114,16 +113,6 @@ _WORK = np.dtype(
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
-    """Advance `state` by h [s] and return how often the forces were evaluated."""
-    left, evaluations = h, 0
-    while left > 0.0:
-        left, count, _ = part(model, law, physics, state, left, tolerance, PART)
-        evaluations += count
-    return evaluations
-
-
-@njit
 def part(
     model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
 ) -> tuple[float, int, int]:
@@ -139,7 +128,7 @@ def part(
             return 0.0, evaluations, work
         if not dragging:
             free, advances = free_time(model, physics, state, left)
-            flight(model, physics, state, free, 1)
+            flight(model, physics, state, free, 1, LAG)
             left -= free
             work += 1 + advances // _ADVANCES
         if left > 0.0:
@@ -148,12 +137,6 @@ def part(
             evaluations += count
             work += count
     return left, evaluations, work
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight."""
-    free_flight.flight(model, physics, state, h, steps, LAG)
 
 
 @njit(cache=True)
@@ -174,14 +157,12 @@ def _go_through(
     turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int, room: Any
 ) -> tuple[float, int]:
     work = room[0]
-    for node in range(NODES):
-        for axis in range(3):
-            work.nodes[node, axis] = state.node_offset[node, axis]
+    work.nodes[:] = state.node_offset
     work.scale[:] = 1.0
     take(turning, state, work.here)
     vanishing(physics, work.here, work.small)
     begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
-    _look_from(turning, dragging, physics, work)
+    _look(turning, dragging, physics, work, work.here, 0, 0)
     time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
     while time < most and evaluations < effort and (dragging or not force_free(work.bits)):
         hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
@@ -200,7 +181,7 @@ def _go_through(
         if forced > _FORCED or not math.isfinite(work.small[1]):
             work.here[:] = math.nan
             break
-        _look_to(turning, dragging, physics, work)
+        _look(turning, dragging, physics, work, work.there, dop853.STAGES, 1)
         lowest = _dip(work, pace)
         if 0.0 < lowest < pace:  # a touch that begins and ends within the step: to be met, or missed, at its deepest
             h = lowest
@@ -219,7 +200,7 @@ def _go_through(
         changed = _cross_zeros(turning, dragging, physics, work)
         _move_on(work)
         if changed:
-            _look_from(turning, dragging, physics, work)
+            _look(turning, dragging, physics, work, work.here, 0, 0)
         if not math.isfinite(work.here[2]):
             break
     give(turning, physics, work.nodes, work.here, state)
@@ -227,31 +208,21 @@ def _go_through(
 
 
 @njit
-def _look_from(turning: bool, dragging: bool, physics: Physics, work: Any) -> None:
-    """Evaluate rate and switches at the start of a step."""
-    rate, value, slope = work.stages[0], work.value[0], work.slope[0]
-    derivative(turning, physics, work.nodes, work.bits, work.here, rate)
-    switches(turning, dragging, physics, work.nodes, work.bits, work.here, rate, value, slope)
-
-
-@njit
-def _look_to(turning: bool, dragging: bool, physics: Physics, work: Any) -> None:
-    """Evaluate rate and switches at the end of a step."""
-    rate, value, slope = work.stages[dop853.STAGES], work.value[1], work.slope[1]
-    derivative(turning, physics, work.nodes, work.bits, work.there, rate)
-    switches(turning, dragging, physics, work.nodes, work.bits, work.there, rate, value, slope)
+def _look(turning: bool, dragging: bool, physics: Physics, work: Any, motion: Any, stage: int, end: int) -> None:
+    """Evaluate rate and switches of the motion at the start of a step (stage 0, end 0) or at its end (the last, 1)."""
+    rate = work.stages[stage]
+    derivative(turning, physics, work.nodes, work.bits, motion, rate)
+    switches(turning, dragging, physics, work.nodes, work.bits, motion, rate, work.value[end], work.slope[end])
 
 
 @njit
 def _move_on(work: Any) -> None:
     """Start from where the step ended."""
     normalise(work.there)
-    for part in range(SIZE):
-        work.here[part] = work.there[part]
-        work.stages[0, part] = work.stages[dop853.STAGES, part]
-    for switch in range(SWITCHES):
-        work.value[0, switch] = work.value[1, switch]
-        work.slope[0, switch] = work.slope[1, switch]
+    work.here[:] = work.there
+    work.stages[0] = work.stages[dop853.STAGES]
+    work.value[0] = work.value[1]
+    work.slope[0] = work.slope[1]
 
 
 @njit
@@ -270,12 +241,8 @@ def _tolerate(physics: Physics, work: Any, tolerance: float, h: float) -> None:
     # What round-off does to a step is no error of it.
     length = max(length, work.small[0])
     pace = max(pace, work.small[0] * hard[0] + 2.0**-49 * speed)
-    for axis in range(3):
-        scale[axis], scale[3 + axis] = length, pace
-    spin, turn = pace * physics.inertia / physics.reach, length / physics.reach
-    for axis in range(3):
-        scale[6 + axis], scale[9 + axis] = spin, turn
-    scale[12] = turn
+    scale[:3], scale[3:6] = length, pace
+    scale[6:9], scale[9:13] = pace * physics.inertia / physics.reach, length / physics.reach
 
 
 @njit
@@ -372,7 +339,7 @@ def _locate(
             evaluations += count + 1
         if not error <= 1.0:
             break
-        _look_to(turning, dragging, physics, work)
+        _look(turning, dragging, physics, work, work.there, dop853.STAGES, 1)
         better = min(most, max(0.0, when + _correction(work, when)))
         if better == when:
             return when, error, evaluations

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of, speed_of
+from stiffdice.dynamics.contact import height_of, speed_of, upward
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 
@@ -87,13 +87,13 @@ def _level_parts(physics: Physics, state: Any, rate: float, wx: float, wy: float
     parts = np.zeros((nodes.shape[0], 4))
     for k in range(nodes.shape[0]):
         x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        level = physics.nx * x + physics.ny * y + physics.nz * z
+        level = upward(physics, x, y, z)
         if rate == 0.0:
             parts[k, 0] = level
             continue
         ax, ay, az = wx / rate, wy / rate, wz / rate
-        on_axis = (ax * x + ay * y + az * z) * (physics.nx * ax + physics.ny * ay + physics.nz * az)
+        on_axis = (ax * x + ay * y + az * z) * upward(physics, ax, ay, az)
         parts[k, 0], parts[k, 1] = on_axis, level - on_axis
-        parts[k, 2] = physics.nx * (ay * z - az * y) + physics.ny * (az * x - ax * z) + physics.nz * (ax * y - ay * x)
+        parts[k, 2] = upward(physics, ay * z - az * y, az * x - ax * z, ax * y - ay * x)
         parts[k, 3] = math.hypot(parts[k, 1], parts[k, 2])
     return parts

@@ -28,11 +28,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of, reaches, speed_of
+from stiffdice.dynamics.contact import drags, height_of, split
 from stiffdice.dynamics.state import TURNING, Array, Physics
-from stiffdice.integrators.adaptive_steps import PART
+from stiffdice.integrators.exact.levels import BELOW, HEIGHT, SUM, fill
 from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, passing
 from stiffdice.integrators.exact.regularised_friction import along, evenly
+from stiffdice.integrators.free_flight import flight
 from stiffdice.scene.scene import Scene
 
 
@@ -48,9 +49,6 @@ FORMULA = "parabolas and damped oscillations in closed form, from one event to t
 # The velocity is that at the stored place.
 LAG = 0.0
 
-# Nodes whose levels differ by less, in units of the farthest node's distance, are level: rounding differs by as much.
-_LEVEL = 2.0**-48
-
 # A cube that stands still, and is as near to touching the ground in units of its height, touches it.
 _LAID = 2.0**-51
 
@@ -60,10 +58,6 @@ _STILL = 2.0**-50
 # Cycles of a cube that slides are taken at once if that changes less of the way.
 _UNSEEN = 1e-15
 
-# Rows of the table of levels, lowest first: height above the lowest [m], how many nodes are on those below, and the sum
-# of their heights [m].
-_HEIGHT, _BELOW, _SUM = range(3)
-
 # What changes at the end of a piece.
 _NONE, _TOUCH, _PRESS, _RELEASE = range(4)
 
@@ -72,7 +66,7 @@ class _Ground(NamedTuple):
     """frequency √(S/m) and decay D/2m of one node [1/s]; drags: whether nodes in the air are damped; pull [m/s²].
 
     by_place, by_speed: S and D over their sum, so that by_place·depth − by_speed·speed has the sign of a node's force.
-    lag: D/S [s]. levels: how many levels there are.
+    levels: how many levels there are.
     """
 
     frequency: float
@@ -81,7 +75,6 @@ class _Ground(NamedTuple):
     pull: float
     by_place: float
     by_speed: float
-    lag: float
     friction: float
     cutoff: float
     levels: int
@@ -125,20 +118,6 @@ def unfit(scene: Scene, model: str) -> str | None:
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
-    """Advance `state` by h [s], of any length, and return how many pieces that took.
-
-    The force is evaluated once for each piece; cycles taken at once are part of one. Not for a model that turns the
-    cube, nor for friction on a slope (`unfit`).
-    """
-    left, pieces = h, 0
-    while left > 0.0:
-        left, count, _ = part(model, law, physics, state, left, tolerance, PART)
-        pieces += count
-    return pieces
-
-
-@njit
 def part(
     model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
 ) -> tuple[float, int, int]:
@@ -148,91 +127,33 @@ def part(
     """
     fall = physics.weight / physics.mass
     pull = fall * physics.nz
-    height, u = height_of(physics, state), speed_of(physics, state)
-    drags = physics.damping > 0.0 and reaches(law, 1.0)
-    if not drags and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
-        _fly(state, fall, h)
+    height = height_of(physics, state)
+    u, tx, ty, tz = split(physics, state.velocity[0], state.velocity[1], state.velocity[2])
+    dragging = physics.damping > 0.0 and drags(law)
+    if not dragging and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
+        flight(model, physics, state, h, 1, LAG)
         return 0.0, 1, 1
-    tx = state.velocity[0] - u * physics.nx
-    ty = state.velocity[1] - u * physics.ny
-    tz = state.velocity[2] - u * physics.nz
     slip = math.hypot(math.hypot(tx, ty), tz) if physics.friction > 0.0 else 0.0
     table = np.empty((3, 9))
-    levels, lowest = _levels(physics, state, table)
+    levels, lowest = fill(physics, state, table)
     before = height + lowest
     # Laid on the ground, to round-off of the place.
     start = 0.0 if u == 0.0 and abs(before) <= _LAID * (abs(height) + physics.reach) else before
-    end, pieces = _advance(_ground_of(physics, drags, pull, levels), table, start, u, slip, h, most)
+    end, pieces = _advance(_ground_of(physics, dragging, pull, levels), table, start, u, slip, h, most)
     c, u, h = end.c, end.u, h - max(0.0, end.left)
     share, time = (end.slip / slip, end.way / slip) if slip > 0.0 else (1.0, h)
+    normal, along_ground = (physics.nx, physics.ny, physics.nz), (tx, ty, tz)
     # Gravity along the ground: none where there is friction.
-    sx, sy, sz = pull * physics.nx, pull * physics.ny, pull * physics.nz - fall
-    state.position[0] += (time * tx + h * (h * sx / 2)) + (c - before) * physics.nx
-    state.position[1] += (time * ty + h * (h * sy / 2)) + (c - before) * physics.ny
-    state.position[2] += (time * tz + h * (h * sz / 2)) + (c - before) * physics.nz
+    slope = pull * physics.nx, pull * physics.ny, pull * physics.nz - fall
+    for axis in range(3):
+        state.position[axis] += (time * along_ground[axis] + h * (h * slope[axis] / 2)) + (c - before) * normal[axis]
+        state.velocity[axis] = (share * along_ground[axis] + h * slope[axis]) + u * normal[axis]
     if pieces > 1:
         # Near the ground the clearance is known to more digits than where it was before.
         gap = c - (height_of(physics, state) + lowest)
-        state.position[0] += gap * physics.nx
-        state.position[1] += gap * physics.ny
-        state.position[2] += gap * physics.nz
-    state.velocity[0] = (share * tx + h * sx) + u * physics.nx
-    state.velocity[1] = (share * ty + h * sy) + u * physics.ny
-    state.velocity[2] = (share * tz + h * sz) + u * physics.nz
+        for axis in range(3):
+            state.position[axis] += gap * normal[axis]
     return end.left if math.isfinite(end.c) else 0.0, pieces, pieces
-
-
-@njit
-def flight(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-    """Take so many steps of free flight, on the parabola."""
-    _fly(state, physics.weight / physics.mass, steps * h)
-
-
-@njit
-def swing(
-    place: float, speed: float, h: float, steps: int, square: float, rate: float, constant: float
-) -> tuple[float, float]:
-    """Return not-a-number, "not known": a single step goes as far."""
-    return math.nan, math.nan
-
-
-@njit
-def _fly(state: Any, fall: float, time: float) -> None:
-    state.position[0] += time * state.velocity[0]
-    state.position[1] += time * state.velocity[1]
-    state.position[2] += time * (state.velocity[2] - fall * (time / 2))
-    state.velocity[2] -= fall * time
-
-
-@njit
-def _levels(physics: Physics, state: Any, table: Array) -> tuple[int, float]:
-    """Fill the table of levels; return how many there are, and the lowest's height above the centre [m]."""
-    heights = table[_HEIGHT]
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        height = physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2]
-        place = k
-        while place > 0 and heights[place - 1] > height:
-            heights[place] = heights[place - 1]
-            place -= 1
-        heights[place] = height
-    table[_BELOW, 0] = table[_SUM, 0] = 0.0
-    levels, start, lowest = 0, 0, 0.0
-    for k in range(1, nodes.shape[0] + 1):
-        if k < nodes.shape[0] and heights[k] - heights[k - 1] <= _LEVEL * physics.reach:
-            continue
-        mean = 0.0
-        for member in range(start, k):
-            mean += (heights[member] - heights[start]) / (k - start)
-        mean += heights[start]
-        if levels == 0:
-            lowest = mean
-        heights[levels] = mean - lowest
-        table[_BELOW, levels + 1] = k
-        table[_SUM, levels + 1] = table[_SUM, levels] + (k - start) * (mean - lowest)
-        levels += 1
-        start = k
-    return levels, lowest
 
 
 @njit
@@ -246,7 +167,6 @@ def _ground_of(physics: Physics, drags: bool, pull: float, levels: int) -> _Grou
         pull,
         stiffness / both if both > 0.0 else 1.0,
         damping / both if both > 0.0 else 0.0,
-        damping / stiffness if stiffness > 0.0 else 0.0,
         physics.friction,
         physics.cutoff,
         levels,
@@ -258,10 +178,10 @@ def _pressing(ground: _Ground, table: Array, c: float, u: float) -> int:
     """Return how many levels, from the lowest on, press on the ground."""
     j = 0
     if u < 0.0:
-        while j < ground.levels and c + table[_HEIGHT, j] <= 0.0:
+        while j < ground.levels and c + table[HEIGHT, j] <= 0.0:
             j += 1
     else:
-        while j < ground.levels and ground.by_place * (c + table[_HEIGHT, j]) + ground.by_speed * u < 0.0:
+        while j < ground.levels and ground.by_place * (c + table[HEIGHT, j]) + ground.by_speed * u < 0.0:
             j += 1
     return j
 
@@ -292,13 +212,13 @@ def _advance(
 @njit
 def _springs(ground: _Ground, table: Array, j: int, c: float) -> float:
     """Return the acceleration by the springs of the lowest j levels [m/s²]."""
-    return -ground.frequency * ground.frequency * (table[_BELOW, j] * c + table[_SUM, j])
+    return -ground.frequency * ground.frequency * (table[BELOW, j] * c + table[SUM, j])
 
 
 @njit
 def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
     """Take what is known ahead of a cube that stands still for a moment: rest, swings about it, or whole bounces."""
-    omega = math.sqrt(table[_BELOW, now.j]) * ground.frequency
+    omega = math.sqrt(table[BELOW, now.j]) * ground.frequency
     springs = _springs(ground, table, now.j, now.c)
     push = springs - ground.pull
     if abs(push) <= _STILL * (abs(ground.pull) + omega * omega * abs(now.c)):
@@ -329,9 +249,9 @@ def _land(ground: _Ground, now: _Course, t: float) -> _Course:
 @njit
 def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
     """Go on to the next event."""
-    nodes, push = table[_BELOW, now.j], _springs(ground, table, now.j, now.c) - ground.pull
+    nodes, push = table[BELOW, now.j], _springs(ground, table, now.j, now.c) - ground.pull
     falls = now.u < 0.0 or (now.u == 0.0 and push < 0.0)
-    beta = ground.decay * (table[_BELOW, ground.levels] if ground.drags and falls else nodes)
+    beta = ground.decay * (table[BELOW, ground.levels] if ground.drags and falls else nodes)
     motion = Oscillator(math.sqrt(nodes) * ground.frequency, beta, push, now.u)
     turn = first_zero(motion.omega, beta, now.u, push - 2 * beta * now.u)
     if falls:
@@ -347,7 +267,7 @@ def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
         j += -1 if event == _RELEASE else 1
         # To the last digit, where the place alone decides.
         if t > 0.0 and (event == _TOUCH or ground.decay == 0.0):
-            c = -table[_HEIGHT, min(j, now.j)]
+            c = -table[HEIGHT, min(j, now.j)]
     left, lost = _later(now, t)
     return _Course(c, u, j, slip, now.way + slipped, left, lost, _lap(now, t), event)
 
@@ -378,7 +298,7 @@ def _landing(pull: Any, c: float, u: float) -> float:
 def _sink(table: Array, motion: Any, j: int, levels: int, c: float, end: float) -> tuple[float, int]:
     """Return when [s] the first event of a falling cube is, at `end` at the latest, and which."""
     if j < levels:
-        gap = c + table[_HEIGHT, j]
+        gap = c + table[HEIGHT, j]
         pace = motion.push - 2 * motion.beta * motion.speed
         t = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, end, _landing(-pace, max(0.0, gap), motion.speed))
         if t <= end:
@@ -404,7 +324,7 @@ def _rise(ground: _Ground, table: Array, motion: Any, j: int, c: float, end: flo
     for _ in range(2):
         level = j - 1 if climbs else j
         if low < high and 0 <= level < ground.levels:
-            gap = ground.by_place * (c + table[_HEIGHT, level])
+            gap = ground.by_place * (c + table[HEIGHT, level])
             t = passing(motion, ground.by_place, ground.by_speed, gap, 1.0 if climbs else -1.0, low, high, math.nan)
             if t <= high and not (climbs and pressed and t == 0.0):
                 return t, _RELEASE if climbs else _PRESS
@@ -427,18 +347,18 @@ def _cycles(
     cutoff/(slip + cutoff), as long as the slip is large against the speed of the swing; its part without the cutoff has
     a closed form.
     """
-    nodes = table[_BELOW, j]
+    nodes = table[BELOW, j]
     if not nodes * ground.frequency > 0.0:
         return 0.0, 0.0, 0.0
     omega = math.sqrt(nodes) * ground.frequency
     rising = ground.decay * nodes
-    falling = ground.decay * (table[_BELOW, ground.levels] if ground.drags else nodes)
+    falling = ground.decay * (table[BELOW, ground.levels] if ground.drags else nodes)
     if not falling < omega:
         return 0.0, 0.0, 0.0
     size, rest = abs(push) / omega / omega, c + push / omega / omega
-    highest = ground.by_place * (rest + size + table[_HEIGHT, j - 1]) + ground.by_speed * omega * size
+    highest = ground.by_place * (rest + size + table[HEIGHT, j - 1]) + ground.by_speed * omega * size
     if not highest <= _STILL * ground.by_place * size or (
-        j < ground.levels and not rest - size + table[_HEIGHT, j] > 0.0
+        j < ground.levels and not rest - size + table[HEIGHT, j] > 0.0
     ):
         return 0.0, 0.0, 0.0
     up = math.sqrt(omega - rising) * math.sqrt(omega + rising)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,8 +11,8 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words, readable, scene_of
 
 # The colours are linear up to this gain, and logarithmic beyond, up to the largest there can be.
 _LINEAR, _MOST = 1e-4, 8.0
@@ -42,12 +41,12 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     _extremes(lower, dataset)
     scan = dataset.omega_h.values
     lower.set_xlim(scan[0], scan[-1])
-    lower.set_xlabel("ωh of a flat landing [1]")
+    lower.set_xlabel(style.OMEGA_H)
     lower.xaxis.set_major_formatter("{x:g}")
-    scene = json.loads(dataset.attrs["scene"])
+    scene = scene_of(dataset)
     note = (
         f"one bounce, undamped, frictionless, gated, {dataset.attrs['scheme'].replace('_', ' ')}; v = "
-        f"{float(dataset.speed):.3g} m/s, S = {number_format.readable(scene['ground']['stiffness'])} kg/s²; "
+        f"{float(dataset.speed):.3g} m/s, {ground_words(stiffness=scene['ground']['stiffness'])}; "
         f"without gravity but for the points that name it, g = {scene['gravity']:g} m/s²"
     )
     style.add_note(figure, note)
@@ -76,7 +75,7 @@ def _map(figure: Figure, panel: Any, dataset: xr.Dataset) -> None:
     panel.set_title("A bounce gains or loses energy by where in a step it meets the ground, but for the magic steps")
     top.set_xlabel("magic steps ωh = 2 sin(π/2n), by n [1]")
     bar = figure.colorbar(drawn, ax=panel, pad=0.01, aspect=30)
-    bar.set_label(f"energy gain e²−1 [1], linear below ±{number_format.readable(_LINEAR)}")
+    bar.set_label(f"energy gain e²−1 [1], linear below ±{readable(_LINEAR)}")
     decades = (1e-3, 1e-2, 1e-1, 1.0, _MOST)
     bar.set_ticks([*(-value for value in decades[-2::-1]), 0, *decades])
     bar.ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
@@ -96,22 +95,13 @@ def _extremes(panel: Any, dataset: xr.Dataset) -> None:
         panel.plot(fine, curve, color=_LOOKS[kind]["color"], linewidth=0.5, label=f"largest {kind} by theory", zorder=2)
     bound = [linear_theory.gain_bound(value) - 1 for value in fine]
     panel.plot(fine, bound, color=style.INK, linewidth=1.0, label="bound of a gain: 1/(1 − ¼(ωh)²) − 1")
-    panel.plot(fine, fine**2 / 4, color=style.INK, linewidth=1.0, linestyle="--", label="bound of a loss: ¼(ωh)²")
+    panel.plot(fine, fine**2 / 4, label="bound of a loss: ¼(ωh)²", **style.THEORY)
     magic = np.isin(scan, list(linear_theory.magic_steps(scan[0], scan[-1]).values()))
     weighed = dataset.largest_with_gravity.values[magic]
     panel.plot(scan[magic], weighed, linestyle="none", label="at a magic step with gravity", **_LOOKS["gravity"])
-    panel.plot(
-        scan,
-        dataset.gravity_theory,
-        color=_LOOKS["gravity"]["color"],
-        linewidth=1.0,
-        linestyle=":",
-        label="theory: 2gh/v",
-    )
+    panel.plot(scan, dataset.gravity_theory, ":", color=style.GREEN, linewidth=1.0, label="theory: 2gh/v")
     panel.set_ylabel("largest |e²−1| over the phases [1]")
-    panel.set_title(
-        "Up to the bound, but nothing at a magic step: there only gravity is left, and round-off without it"
-    )
+    panel.set_title("Up to the bound, but nothing at a magic step: only gravity is left, and round-off without it")
     # Between what gravity leaves and round-off there is nothing to hide.
     panel.set_ylim(1e-15, 1e2)
     panel.legend(loc="center", bbox_to_anchor=(0.5, 0.34), ncols=2)

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
+from stiffdice.dynamics.state import Array
 from stiffdice.report.figures import style
 from stiffdice.report.figures.registry import FRAMES_PER_SECOND
-from stiffdice.report.number_format import describe
+from stiffdice.report.number_format import describe, scene_of
 from stiffdice.scene.cube import LINKS
-
-
-def start(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the cube at the launch."""
-    return _at(runs, title, 0.0)
-
-
-def middle(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the cube half-way through the run."""
-    return _at(runs, title, 0.5)
-
-
-def end(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the cube at the end of the run."""
-    return _at(runs, title, 1.0)
 
 
 def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
@@ -43,6 +28,9 @@ def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
     _path(axes, run, index)
     style.add_note(figure, describe(run, law=True))
     return figure
+
+
+start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
 
 
 def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
@@ -66,7 +54,7 @@ def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
     return FuncAnimation(figure, show, frames=count)
 
 
-def _links(run: xr.Dataset, index: int) -> npt.NDArray[np.float64]:
+def _links(run: xr.Dataset, index: int) -> Array:
     """Return the ends of the twelve links [m], shape (12, 2, 3)."""
     nodes = run.position.values[index] + run.node_offset.values[index]
     return np.asarray(nodes[np.array(LINKS)])
@@ -74,7 +62,7 @@ def _links(run: xr.Dataset, index: int) -> npt.NDArray[np.float64]:
 
 def _edges(axes: Any) -> Line3DCollection:
     return axes.add_collection3d(
-        Line3DCollection(np.zeros((1, 2, 3)), colors=style.LISTED, linewidths=1.3, zorder=4, clip_on=False)
+        Line3DCollection(np.zeros((1, 2, 3)), colors=style.BLUE, linewidths=1.3, zorder=4, clip_on=False)
     )
 
 
@@ -105,7 +93,7 @@ def _room(run: xr.Dataset, title: str) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def _limits(run: xr.Dataset) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _limits(run: xr.Dataset) -> tuple[Array, Array]:
     """Return the corners of a box, on whole metres, that holds the cube for the whole run."""
     reach = float(np.linalg.norm(run.node_offset.values[0], axis=-1).max())
     low = np.floor(run.position.values.min(axis=0) - reach)
@@ -115,9 +103,9 @@ def _limits(run: xr.Dataset) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.fl
     return low, high
 
 
-def _draw_ground(axes: Any, run: xr.Dataset, low: npt.NDArray[np.float64], high: npt.NDArray[np.float64]) -> None:
+def _draw_ground(axes: Any, run: xr.Dataset, low: Array, high: Array) -> None:
     """Draw the plane n·x = 0 under the run, with a grid of two metres."""
-    nx, ny, nz = json.loads(run.attrs["scene"])["ground"]["normal"]
+    nx, ny, nz = scene_of(run)["ground"]["normal"]
     if nz == 0:
         return  # a wall has no height over x and y
 

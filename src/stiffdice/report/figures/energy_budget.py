@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 
 # By what is booked: a look, and words. Gains are marks that point up, losses marks that point down.
@@ -29,12 +27,12 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     experiments: one, as `experiments.ledger.measure` makes it.
     """
     (books,) = experiments.values()
-    laws = meanings_of(books.contact)
+    laws = style.by_law([books])
     figure = style.new_figure(title, width=9.0, height=1.6 + 2.7 * len(laws))
     panels = figure.subplots(len(laws), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for k, (panel, law) in enumerate(zip(panels, laws, strict=True)):
-        _panel(panel, books.isel(contact=k))
-        panel.set_title(style.LAW_NAMES[law])
+    for panel, law in zip(panels, laws, strict=True):
+        _panel(panel, law)
+        panel.set_title(style.law_of(law))
         panel.set_ylabel("work in one bounce [J]")
     labels = [
         f"{int(steps):,}\nωh = {float(omega_h):.3g}" for steps, omega_h in zip(books.steps, books.omega_h, strict=True)
@@ -64,22 +62,16 @@ def _panel(panel: Any, books: xr.Dataset) -> None:
         color = _LOOKS[name][0]
         for gain, marker in ((True, "^"), (False, "v")):
             group, bounce = np.nonzero(values > 0 if gain else values < 0)
-            panel.plot(
-                group + offsets[bounce],
-                np.abs(values[group, bounce]),
-                marker,
-                color=color,
-                markerfacecolor=color if gain else "none",
-                markersize=5,
-            )
+            look = {"color": color, "markerfacecolor": color if gain else "none", "markersize": 5}
+            panel.plot(group + offsets[bounce], np.abs(values[group, bounce]), marker, **look)
     for edge in range(1, books.sizes["steps"]):
         panel.axvline(edge - 0.5, color=style.FAINT, linewidth=0.8)
     panel.grid(axis="x", visible=False)
 
 
 def _legend() -> list[Any]:
-    handles = [Line2D([], [], marker="s", linestyle="none", color=color, label=text) for color, text in _LOOKS.values()]
-    common: Any = {"linestyle": "none", "color": style.INK}
-    handles.append(Line2D([], [], marker="^", label="full, up: energy gained", **common))
-    handles.append(Line2D([], [], marker="v", markerfacecolor="none", label="open, down: energy lost", **common))
-    return handles
+    return [
+        *(style.mark(text, "s", color=color) for color, text in _LOOKS.values()),
+        style.mark("full, up: energy gained", "^", color=style.INK),
+        style.mark("open, down: energy lost", "v", color=style.INK, markerfacecolor="none"),
+    ]

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words, readable
 
 _LOOKS = [(style.BLUE, "o"), (style.VERMILION, "s"), (style.GREEN, "D"), (style.ORANGE, "^"), (style.PURPLE, "v")]
 
@@ -31,33 +31,17 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         color, marker = _LOOKS[k % len(_LOOKS)]
         least = float(dataset.least_step[k])
         rests = swings[k] < lowest
-        common: Any = {
-            "linestyle": "none",
-            "marker": marker,
-            "color": color,
-            "markersize": max(3, 8 - 2 * k),
-            "zorder": 3,
-        }
-        panel.plot(sizes[~rests], swings[k, ~rests], label=f"μ = {number_format.readable(float(mu))}", **common)
+        common: Any = {"linestyle": "none", "marker": marker, "color": color, "zorder": 3}
+        common["markersize"] = max(3, 8 - 2 * k)
+        panel.plot(sizes[~rests], swings[k, ~rests], label=ground_words(friction=float(mu)), **common)
         panel.plot(sizes[rests], np.full(rests.sum(), lowest), markerfacecolor="none", clip_on=False, **common)
         if least < sizes.max():
             fine = least * np.geomspace(1 + 1e-9, sizes.max() / least, 1000)
             cutoff = float(dataset.swing_theory[k, -1]) / (sizes[-1] / least - 1)
-            panel.plot(fine, cutoff * (fine / least - 1), color=style.INK, linestyle="--", linewidth=1.0)
-            panel.annotate(
-                f"{number_format.readable(least)} s",
-                (least, lowest),
-                xytext=(-2, 12),
-                textcoords="offset points",
-                rotation=90,
-                ha="right",
-                va="bottom",
-                fontsize=8,
-                color=color,
-            )
-    panel.plot(
-        [], [], color=style.INK, linestyle="--", linewidth=1.0, label="theory: μ g h/2 − umin, from h = 2 umin/(μ g) on"
-    )
+            panel.plot(fine, cutoff * (fine / least - 1), **style.THEORY)
+            look = {"rotation": 90, "ha": "right", "va": "bottom", "color": color}
+            style.write_beside(panel, f"{readable(least)} s", (least, lowest), (-2, 12), **look)
+    panel.plot([], [], label="theory: μ g h/2 − umin, from h = 2 umin/(μ g) on", **style.THEORY)
     panel.plot([], [], "o", color=style.QUIET, markerfacecolor="none", label="comes to rest", markersize=5)
     panel.set_xlabel("step size h [s]")
     panel.set_ylabel("largest sliding speed of a cube at rest [m/s]")

@@ -9,11 +9,10 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
@@ -31,9 +30,9 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         for s, color in enumerate(colors):
             _line(upper, there.tolerance, there.error.values[s], color)
             _line(lower, there.tolerance, there.evaluations.values[s].astype(float), color)
-        upper.plot(there.tolerance, there.tolerance, color=style.INK, linestyle="--", linewidth=0.9)
+        upper.plot(there.tolerance, there.tolerance, **style.THEORY)
         upper.axhline(float(there.reference_error.median()), color=style.QUIET, linestyle=":", linewidth=1.2)
-        upper.set(xscale="log", yscale="log", title=f"μ = {number_format.readable(float(there.friction))}")
+        upper.set(xscale="log", yscale="log", title=ground_words(friction=float(there.friction)))
         lower.set(xscale="log", yscale="log", xlabel="tolerance [1]")
         lower.xaxis.set_major_locator(LogLocator(numticks=6))
         lower.xaxis.set_minor_formatter(NullFormatter())
@@ -41,13 +40,13 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     rows[1, 0].set_ylabel("force evaluations [1]")
     rows[0, 0].invert_xaxis()
     handles = [
-        Line2D([], [], color=color, label=f"S = {number_format.readable(float(value))} kg/s²")
+        style.line(ground_words(stiffness=float(value)), color=color)
         for color, value in zip(colors, dataset.stiffness.values, strict=True)
     ]
     handles += [
-        Line2D([], [], color=style.INK, linestyle="none", marker=".", label="worst launch"),
-        Line2D([], [], color=style.INK, linestyle="--", linewidth=0.9, label="the tolerance itself"),
-        Line2D([], [], color=style.QUIET, linestyle=":", label="LSODA from LSODA"),
+        style.mark("worst launch", ".", color=style.INK),
+        style.line("the tolerance itself", **style.THEORY),
+        style.line("LSODA from LSODA", color=style.QUIET, linestyle=":"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     style.add_note(figure, f"lines: medians of {dataset.sizes['launch']} launches; error: distance from LSODA at 1e-13")

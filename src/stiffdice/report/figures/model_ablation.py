@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import duration, ground_words, scene_of
 
 # Of a friction coefficient, in ascending order; more of them begin anew.
 _COLORS = ("#56B4E9", style.BLUE, style.GREEN, style.ORANGE, style.VERMILION, style.PURPLE)
-_MARKERS = "osD^vP"
 # A difference is drawn hollow unless it is so many times what the runs themselves are off by.
 _CLEAR = 3.0
 
@@ -42,21 +40,18 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     experiments: one, as `experiments.pieces.measure` makes it. A row for each contact law.
     """
     (dataset,) = experiments.values()
-    laws = meanings_of(dataset.contact)
+    laws = style.by_law([dataset])
     figure = style.new_figure(title, width=12.4, height=3.3 * len(laws) + 1.0)
     rows = figure.subplots(len(laws), 3, sharex=True, squeeze=False)
-    for c, (law, (left, middle, right)) in enumerate(zip(laws, rows, strict=True)):
-        there = dataset.isel(contact=c)
-        _distances(left, there)
-        _partings(middle, there)
-        _spins(right, there)
-        left.set_title(f"{style.LAW_NAMES[law]}: error")
-        middle.set_title(f"{style.LAW_NAMES[law]}: parting")
-        right.set_title(f"{style.LAW_NAMES[law]}: spin")
+    parts = {"error": _distances, "parting": _partings, "spin": _spins}
+    for there, row in zip(laws, rows, strict=True):
+        for panel, (name, part) in zip(row, parts.items(), strict=True):
+            part(panel, there)
+            panel.set_title(f"{style.law_of(there)}: {name}")
     for panel in rows[-1]:
-        panel.set_xlabel("stiffness S [kg/s²]")
+        panel.set_xlabel(style.STIFFNESS)
     figure.legend(handles=_legend(dataset), loc="outside right center")
-    launch = json.loads(dataset.attrs["scene"])["launch"]
+    launch = scene_of(dataset)["launch"]
     style.add_note(
         figure,
         f"against the full model (tumbling), launched upright at {launch['velocity']} m/s from {launch['position']} m; "
@@ -67,15 +62,9 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 
 def _frictions(there: xr.Dataset) -> list[tuple[int, float, dict[str, Any]]]:
     """Return index, coefficient and look of each friction but none."""
-    rough = [f for f, mu in enumerate(there.friction.values) if mu > 0]
-    return [
-        (
-            f,
-            float(there.friction[f]),
-            {"color": _COLORS[k % len(_COLORS)], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 4},
-        )
-        for k, f in enumerate(rough)
-    ]
+    rough = [(f, mu) for f, mu in enumerate(there.friction.values.tolist()) if mu > 0]
+    looks = cycle({"color": color, "marker": marker} for color, marker in zip(_COLORS, "osD^vP", strict=True))
+    return [(f, mu, {**look, "markersize": 4}) for (f, mu), look in zip(rough, looks, strict=False)]
 
 
 def _distances(panel: Any, there: xr.Dataset) -> None:
@@ -106,25 +95,21 @@ def _spins(panel: Any, there: xr.Dataset) -> None:
     for f, mu, look in _frictions(there):
         panel.plot(there.stiffness, there.spin[f] / mu, linewidth=1.0, **look)
     f, mu, _ = _frictions(there)[0]
-    panel.plot(there.stiffness, there.spin_theory[f] / mu, color=style.INK, linestyle="--", linewidth=1.0)
+    panel.plot(there.stiffness, there.spin_theory[f] / mu, **style.THEORY)
     panel.axhline(0, color=style.QUIET, linewidth=0.8)
-    panel.text(0.98, 0.96, "< 0: rolls backwards", transform=panel.transAxes, ha="right", va="top", fontsize=8)
+    style.write_in_corner(panel, 0.98, "< 0: rolls backwards")
     panel.set_xscale("log")
     panel.set_ylabel("spin after the first landing over μ [rad/s]")
 
 
 def _legend(dataset: xr.Dataset) -> list[Any]:
-    handles: list[Any] = [
-        Line2D([], [], label=f"μ = {number_format.readable(mu)}", linewidth=1.0, **look)
-        for _, mu, look in _frictions(dataset.isel(contact=0))
-    ]
-    ink: dict[str, Any] = {"color": style.INK, "linewidth": 1.0}
+    frictions = _frictions(dataset)
     return [
-        *handles,
-        Line2D([], [], **ink, label="sliding (ground_cube)"),
-        Line2D([], [], **ink, linestyle=":", label="sliding without friction"),
-        Line2D([], [], **ink, linestyle="--", label="theory, small μ"),
-        Line2D([], [], color=style.QUIET, linewidth=1.0, linestyle="--", label="second landing, μ = 0"),
+        *(style.line(ground_words(friction=mu), linewidth=1.0, **look) for _, mu, look in frictions),
+        style.line("sliding (ground_cube)", **style.THEORY | {"linestyle": "-"}),
+        style.line("sliding without friction", **style.THEORY | {"linestyle": ":"}),
+        style.line("theory, small μ", **style.THEORY),
+        style.line("second landing, μ = 0", **style.THEORY | {"color": style.QUIET}),
     ]
 
 
@@ -137,14 +122,12 @@ def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels = figure.subplots(1, len(timings), sharex=True, sharey=True, squeeze=False)[0]
     for panel, dataset in zip(panels, timings.values(), strict=True):
         _bars(panel, dataset)
-        law = json.loads(dataset.attrs["scene"])["ground"]["contact"]
+        law = scene_of(dataset)["ground"]["contact"]
         panel.set_title(f"{style.LAW_NAMES[law]}: unneeded")
-    panels[0].set_yticks(
-        range(timings[next(iter(timings))].sizes["piece"]),
-        [_PIECE_WORDS[name] for name in meanings_of(next(iter(timings.values())).piece)],
-    )
+    pieces = meanings_of(next(iter(timings.values())).piece)
+    panels[0].set_yticks(range(len(pieces)), [_PIECE_WORDS[name] for name in pieces])
     panels[0].invert_yaxis()
-    handles = [Line2D([], [], color=color, linewidth=6, label=text) for text, color in _KINDS.values()]
+    handles = [style.line(text, color=color, linewidth=6) for text, color in _KINDS.values()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -157,7 +140,7 @@ def _bars(panel: Any, dataset: xr.Dataset) -> None:
         panel.barh(places, np.nan_to_num(ratios, nan=1.0) - 1, left=1.0, height=0.24, color=color)
         for place, ratio, (full, least) in zip(places, ratios, seconds, strict=True):
             if np.isfinite(ratio):
-                text = f" {ratio:.3g}×: {_readable(full)} / {_readable(least)}"
+                text = f" {ratio:.3g}×: {duration(full)} / {duration(least)}"
                 panel.text(max(1.0, ratio), place, text, va="center", fontsize=7.5)
     panel.axvline(1.0, color=style.INK, linewidth=0.8)
     panel.set_xscale("log")
@@ -166,11 +149,3 @@ def _bars(panel: Any, dataset: xr.Dataset) -> None:
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(visible=False, axis="y")
     panel.set_xlabel("time with the piece over time without it [1]")
-
-
-def _readable(seconds: float) -> str:
-    """Return a time as a person writes it."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"

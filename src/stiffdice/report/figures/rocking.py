@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words, readable, scene_of
 
 # One look for each contact mode, smaller from one to the next: all that lie on one point show.
 _LOOKS: dict[str, dict[str, Any]] = {
@@ -25,7 +23,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.GREEN, "marker": "D", "markersize": 5.0},
     "corner": {"color": style.INK, "marker": "^", "markersize": 3.0},
 }
-_SAY = {"face_bounce": "face bounce", "face_rocking": "face rocking", "edge": "edge", "corner": "corner"}
+_MODE_NAMES = {"face_bounce": "face bounce", "face_rocking": "face rocking", "edge": "edge", "corner": "corner"}
 # A pale mark within an outline: two inertias at one point show, too.
 _FILLS: dict[str, dict[str, Any]] = {
     "corners": {"alpha": 0.3, "markeredgewidth": 0, "zorder": 2.5},
@@ -52,15 +50,12 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 def _limits(panel: Any, dataset: xr.Dataset) -> None:
     zeta = dataset.zeta.values
     fine = np.linspace(0, zeta.max(), 201)
-    panel.plot(
-        fine, [linear_theory.stability_limit(value) for value in fine], color=style.INK, linestyle="--", linewidth=1.0
-    )
+    panel.plot(fine, [linear_theory.stability_limit(value) for value in fine], **style.THEORY)
     for i, inertia in enumerate(meanings_of(dataset.inertia)):
         for k, mode in enumerate(meanings_of(dataset.mode)):
             _marks(panel, zeta, dataset.limit.values[i, k], mode, inertia)
-    error = number_format.readable(float(f"{np.abs(dataset.limit_error.values).max():.1e}"))
-    note = f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}"
-    panel.text(0.98, 0.98, note, transform=panel.transAxes, ha="right", va="top", fontsize=8)
+    error = readable(np.abs(dataset.limit_error.values).max(), digits=2)
+    style.write_in_corner(panel, 0.98, f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}")
     panel.set_title("One limit in units of each mode's own ω")
     panel.set_xlabel("damping ratio ζ of the mode [1]")
     panel.set_ylabel("measured limit ωh [1]")
@@ -76,23 +71,16 @@ def _longest_steps(panel: Any, dataset: xr.Dataset) -> None:
     for i, inertia in enumerate(inertias):
         worst = int(steps[i].argmin())
         panel.axhline(steps[i, worst], color=_LOOKS[modes[worst]]["color"], linewidth=0.8, linestyle=":", zorder=1)
-        panel.annotate(
-            f"{inertia}: limited by {_SAY[modes[worst]]}, {steps[i, worst]:.3f}",
-            (len(modes) - 0.45, steps[i, worst]),
-            xytext=(0, -6),
-            textcoords="offset points",
-            ha="right",
-            va="top",
-            fontsize=8,
-        )
+        text = f"{inertia}: limited by {_MODE_NAMES[modes[worst]]}, {steps[i, worst]:.3f}"
+        style.write_beside(panel, text, (len(modes) - 0.45, steps[i, worst]), (0, -6), ha="right", va="top")
         for k, mode in enumerate(modes):
-            panel.plot([k - 0.25, k + 0.25], [predicted[i, k]] * 2, color=style.INK, linestyle="--", linewidth=1.0)
+            panel.plot([k - 0.25, k + 0.25], [predicted[i, k]] * 2, **style.THEORY)
             _marks(panel, [k], [steps[i, k]], mode, inertia, size=8)
     # Two inertias with the same k share a label.
     labels = {(k, round(numbers[i, k])): steps[i, k] for i, k in np.ndindex(steps.shape)}
     for (k, number), step in labels.items():
-        panel.annotate(f"k = {number}", (k, step), xytext=(0, 8), textcoords="offset points", ha="center", fontsize=8)
-    panel.set_xticks(range(len(modes)), [_SAY[mode].replace(" ", "\n") for mode in modes])
+        style.write_beside(panel, f"k = {number}", (k, step), (0, 8), ha="center")
+    panel.set_xticks(range(len(modes)), [_MODE_NAMES[mode].replace(" ", "\n") for mode in modes])
     panel.set_xlim(-0.5, len(modes) - 0.4)
     panel.set_ylim(min(steps.min() * 0.87, steps.min() - 0.05), steps.max() * 1.1)
     panel.set_title(f"The longest step, at ζ = {float(dataset.zeta[least]):g}")
@@ -105,34 +93,15 @@ def _growths(panel: Any, dataset: xr.Dataset) -> None:
     fine = np.unique(np.concatenate([np.linspace(scan.min(), scan.max(), 401), [1.0]]))
     for z, zeta in enumerate(dataset.nudge_zeta.values):
         limit = linear_theory.stability_limit(zeta)
-        panel.plot(
-            fine,
-            [linear_theory.growth(part * limit, zeta) for part in fine],
-            color=style.INK,
-            linestyle="--",
-            linewidth=1.0,
-        )
+        growth = [linear_theory.growth(part * limit, zeta) for part in fine]
+        panel.plot(fine, growth, **style.THEORY)
         for i, inertia in enumerate(meanings_of(dataset.inertia)):
             for k, nudge in enumerate(meanings_of(dataset.nudge)):
-                _marks(
-                    panel,
-                    scan,
-                    dataset.growth.values[i, k, z],
-                    _NUDGES[nudge],
-                    inertia,
-                    size=5 + 2 * (nudge == "bounce"),
-                )
-        panel.annotate(
-            f"ζ = {zeta:g}",
-            (fine[-1], linear_theory.growth(fine[-1] * limit, zeta)),
-            xytext=(-14, 0),
-            textcoords="offset points",
-            ha="right",
-            fontsize=8,
-        )
-    stiffness = json.loads(dataset.attrs["scene"])["ground"]["stiffness"]
-    note = f"S = {number_format.readable(stiffness)} kg/s²\ngated, no friction"
-    panel.text(0.04, 0.96, note, transform=panel.transAxes, va="top", fontsize=8)
+                size = 5 + 2 * (nudge == "bounce")
+                _marks(panel, scan, dataset.growth.values[i, k, z], _NUDGES[nudge], inertia, size=size)
+        style.write_beside(panel, f"ζ = {zeta:g}", (fine[-1], growth[-1]), (-14, 0), ha="right")
+    stiffness = scene_of(dataset)["ground"]["stiffness"]
+    style.write_in_corner(panel, 0.04, f"{ground_words(stiffness=stiffness)}\ngated, no friction")
     panel.set_title("A nudge to the cube at rest on its face")
     panel.set_xlabel("ωh over its limit [1]")
     panel.set_ylabel("growth of the nudge in a step [1]")
@@ -146,10 +115,9 @@ def _marks(
 
 
 def _legend() -> list[Any]:
-    handles: list[Any] = [
-        Line2D([], [], linestyle="none", label=_SAY[mode], **look, **_FILLS["solid"]) for mode, look in _LOOKS.items()
+    return [
+        *(style.mark(_MODE_NAMES[mode], **look, **_FILLS["solid"]) for mode, look in _LOOKS.items()),
+        Patch(facecolor="none", edgecolor=style.INK, label="outline: solid inertia"),
+        style.area("filled: corners inertia", style.INK, alpha=0.3),
+        style.line("theory", **style.THEORY),
     ]
-    handles.append(Patch(facecolor="none", edgecolor=style.INK, label="outline: solid inertia"))
-    handles.append(Patch(color=style.INK, alpha=0.3, linewidth=0, label="filled: corners inertia"))
-    handles.append(Line2D([], [], color=style.INK, linestyle="--", linewidth=1.0, label="theory"))
-    return handles

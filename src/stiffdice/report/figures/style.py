@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.errors import printable
+from stiffdice.io.cf_enums import meanings_of
 
 # Okabe and Ito, "Color Universal Design" (2008), ordered by lightness in grey.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 INK, QUIET, FAINT = "#222222", "#6e6e6e", "#d9d9d9"
 
-LISTED, WRITTEN = BLUE, ORANGE
 PRESET_LOOKS: dict[str, dict[str, Any]] = {
-    "as_listed": {"color": LISTED, "label": "as listed", "zorder": 3},
-    "as_written": {"color": WRITTEN, "label": "as written", "zorder": 2, "linewidth": 2.0},
+    "as_listed": {"color": BLUE, "label": "as listed", "zorder": 3},
+    "as_written": {"color": ORANGE, "label": "as written", "zorder": 2, "linewidth": 2.0},
     "corrected": {"color": GREEN, "label": "corrected", "zorder": 2.5},
 }
 
+# Of what theory says.
+THEORY: dict[str, Any] = {"color": INK, "linestyle": "--", "linewidth": 1.0}
+
+STIFFNESS, OMEGA_H = "stiffness S [kg/s²]", "ωh of a flat landing [1]"
 LAW_NAMES = {"ungated": "as listed (ungated)", "gated": "as written (gated)"}
 
 # Of a criterion's edges: colour, and the marks of first pass and last fail.
@@ -114,10 +122,49 @@ def add_note(figure: Figure, text: str) -> None:
     figure.supxlabel(text, x=0.01, ha="left", fontsize=7.5, color=QUIET)
 
 
-def maker_of(found: Any) -> str:
-    """Return who made the runs of a sweep, to come after its contact law; nothing if we did."""
-    simulator = found.attrs["simulator"]
-    return "" if simulator == "stiffdice" else f", {simulator}"
+def line(label: str, **look: Any) -> Line2D:
+    """Return a line for a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def mark(label: str, marker: str, **look: Any) -> Line2D:
+    """Return a mark without a line for a legend."""
+    return Line2D([], [], label=label, linestyle="none", marker=marker, **look)
+
+
+def area(label: str, color: str, **look: Any) -> Patch:
+    """Return a coloured area for a legend."""
+    return Patch(color=color, linewidth=0, label=label, **look)
+
+
+def write_beside(panel: Any, text: str, place: tuple[float, float], offset: tuple[float, float], **look: Any) -> None:
+    """Write a small text beside a place of a panel, so many points to the right of it and above."""
+    panel.annotate(text, place, xytext=offset, textcoords="offset points", **{"fontsize": 8} | look)
+
+
+def write_in_corner(panel: Any, x: float, text: str, **look: Any) -> None:
+    """Write a small text at the top of a panel, x from 0 to 1: on its left half to the right, else to the left."""
+    side = "left" if x < 0.5 else "right"
+    panel.text(x, 0.96, text, transform=panel.transAxes, **{"ha": side, "va": "top", "fontsize": 8} | look)
+
+
+def plain_log_ticks(axis: Any, multiples: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    """Label these multiples of each power of ten on a logarithmic axis, as 0.2 and not as 2×10⁻¹."""
+    axis.set_major_locator(LogLocator(subs=multiples))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
+
+
+def by_law(found: Iterable[xr.Dataset]) -> list[xr.Dataset]:
+    """Return a dataset for each contact law of sweeps or experiments."""
+    return [part.isel(contact=k) for part in found for k in range(part.sizes["contact"])]
+
+
+def law_of(found: xr.Dataset, contact: str = "contact") -> str:
+    """Return the contact law of a dataset of one law, and who made its runs unless we did."""
+    law = LAW_NAMES[meanings_of(found[contact])[int(found[contact].values.flat[0])]]
+    simulator = found.attrs.get("simulator", "stiffdice")
+    return law if simulator == "stiffdice" else f"{law}, {simulator}"
 
 
 def borders(centres: npt.NDArray[np.float64], *, logarithmic: bool = False) -> npt.NDArray[np.float64]:

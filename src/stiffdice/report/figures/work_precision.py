@@ -1,105 +1,137 @@
-"""Work and precision: error against force evaluations, or against time where it was measured."""
+"""Work and precision: error against cost, and the cost of an error against stiffness; in evaluations, or in seconds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
+from stiffdice.dynamics.state import Array
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
-from stiffdice.report.figures import effort_ladder, style
-from stiffdice.report.tables import engine_notes
-from stiffdice.report.tables.work_precision import Found, found_in
+from stiffdice.report.figures import method_looks, style
+from stiffdice.report.methods import engines_note
+from stiffdice.report.number_format import ground_words
+from stiffdice.report.tables.work_precision import ERRORS, Found, found_in
 
 # So many stiffnesses are drawn at most, from the softest to the stiffest.
 _COLUMNS = 3
-_ERRORS = {
+_ERROR_LABELS = {
     "position": "position error, RMS [r]",
     "restitution": "error of the restitution [1]",
     "energy": "error of the energy at the end [E₀]",
 }
+_BOUND_LABELS = {1e-2: "1 %", 1e-3: "10⁻³", 1e-6: "10⁻⁶"}
 # Errors above are drawn at the upper edge: such a run has nothing to do with the reference any more.
 _WORST = 10.0
+# The scheme whose cost the √S law is drawn through, at the softest ground.
+_LAW_OF = "symplectic_euler"
+_MORE: dict[str, Any] = {"marker": r"$\uparrow$", "markersize": 9}
 
 
-def position(data: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return a panel for each problem and some stiffnesses; data: experiments `work-precision`, and timings of them."""
-    return _drawn(data, title, "position")
+def _errors(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
+    """Return errors against cost, a row for each problem and a column for some stiffnesses.
 
-
-def restitution(data: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the same for the restitution of the first landing."""
-    return _drawn(data, title, "restitution")
-
-
-def energy(data: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the same for the energy at the end."""
-    return _drawn(data, title, "energy")
-
-
-def _drawn(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
+    data: experiments `work-precision`, and timings of them.
+    """
     rows = found_in(data.values())
-    figure = style.new_figure(title, width=12.0, height=3.1 * len(rows) + 1.4)
     columns = min(_COLUMNS, max(found.data.sizes["stiffness"] for found in rows))
-    panels = figure.subplots(len(rows), columns, sharex="row", sharey="row", squeeze=False)
+    figure, panels = _grid(title, rows, columns, sharex="row")
     for line, found in zip(panels, rows, strict=True):
         shown = np.linspace(0, found.data.sizes["stiffness"] - 1, columns).round().astype(int)
         for panel, stiffness in zip(line, shown, strict=True):
-            _panel(panel, found, int(stiffness), measure)
-        line[0].set_ylabel(_ERRORS[measure])
-    told = engine_notes.line(found.data for found in rows)
-    words: dict[str, Any] = {"title": told, "title_fontsize": 7.5} if told else {}
-    figure.legend(handles=_legend(rows), loc="outside lower center", ncols=6, **words)
+            _errors_panel(panel, found, int(stiffness), measure)
+        line[0].set_ylabel(_ERROR_LABELS[measure])
+    grey = style.area("round-off: in the launch (line) … in a contact's depth", style.QUIET, alpha=0.25)
+    handles = [grey, *([_hollow("time per step × steps")] if any(found.seconds is not None for found in rows) else [])]
+    note = engines_note(found.data for found in rows)
+    _legend(figure, rows, handles, **({"title": note, "title_fontsize": 7.5} if note else {}))
     return figure
 
 
-def _panel(panel: Any, found: Found, stiffness: int, measure: str) -> None:
+def _costs(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
+    """Return Figure 13 asked again: costs against stiffness, a row for each problem and a column for each error.
+
+    data: experiments `work-precision`, and timings of them.
+    """
+    rows = found_in(data.values())
+    figure, panels = _grid(title, rows, len(ERRORS), sharex=True)
+    for line, found in zip(panels, rows, strict=True):
+        for panel, bound in zip(line, ERRORS, strict=True):
+            _costs_panel(panel, found, measure, bound)
+            panel.set_title(f"{PROBLEMS[found.problem].name}, {measure} to {_BOUND_LABELS[bound]}")
+        line[0].set_ylabel("force evaluations [1]" if found.seconds is None else "wall time [s]")
+    for panel in panels[-1]:
+        panel.set_xlabel(style.STIFFNESS)
+    law = style.line("the paper's law: ∝ √S", color=style.INK, linestyle=":", linewidth=1.0)
+    more = style.mark("more than this, tried in vain", color=style.QUIET, **_MORE)
+    _legend(figure, rows, [law, _hollow("ladder continued", markersize=4), more])
+    return figure
+
+
+# In this order the catalogue names them.
+position, restitution, energy = (partial(_errors, measure=measure) for measure in _ERROR_LABELS)
+cost_position, cost_restitution, cost_energy = (partial(_costs, measure=measure) for measure in _ERROR_LABELS)
+
+
+def _grid(title: str, rows: list[Found], columns: int, sharex: Any) -> tuple[Figure, Any]:
+    figure = style.new_figure(title, width=12.0, height=3.1 * len(rows) + 1.4)
+    panels = figure.subplots(len(rows), columns, sharex=sharex, sharey="row", squeeze=False)
+    for panel in panels.flat:
+        panel.set(xscale="log", yscale="log")
+    return figure, panels
+
+
+def _legend(figure: Figure, rows: list[Found], handles: Iterable[Any], **words: Any) -> None:
+    names = list(dict.fromkeys(name for found in rows for name in found.methods))
+    handles = [*method_looks.handles(names), *handles]
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, **words)
+
+
+def _hollow(label: str, **look: Any) -> Any:
+    return style.mark(f"hollow: {label}", "o", markerfacecolor="none", color=style.QUIET, **look)
+
+
+def _draw_method(panel: Any, method: str, x: Array, y: Array, full: npt.NDArray[np.bool_]) -> None:
+    """Draw a method's line, its marks full or hollow."""
+    look = method_looks.look(method)
+    panel.plot(x, y, markevery=0, label=method, **look | {"marker": ""})
+    panel.plot(x[full], y[full], **look | {"linestyle": "none"})
+    panel.plot(x[~full], y[~full], **look | {"linestyle": "none", "markerfacecolor": "none"})
+
+
+def _errors_panel(panel: Any, found: Found, stiffness: int, measure: str) -> None:
     data = found.data.isel(stiffness=stiffness)
-    timed = found.seconds is not None
     costs = found.data.evaluations.values if found.seconds is None else found.seconds
-    panel.set(xscale="log", yscale="log")
+    low, high = data.floor.values[:, meanings_of(data.measure).index(measure)].tolist()
+    errors = data[f"{measure}_error"].values
+    # Errors of nothing are drawn at a tenth of the floor, or of the least error found.
+    lowest = float(np.min(errors[errors > 0], initial=low)) / 10
+    errors = np.clip(np.where(np.isnan(errors), np.inf, errors), lowest, _WORST)
     for k, method in enumerate(found.methods):
-        errors, x = data[f"{measure}_error"].values[k], costs[stiffness, k]
-        drawn = (data.evaluations.values[k] > 0) & np.isfinite(x)
-        kept = np.clip(np.where(np.isnan(errors), np.inf, errors), _lowest(data, measure), _WORST)
-        look = effort_ladder.look(method)
-        panel.plot(x[drawn], kept[drawn], markevery=0, label=method, **look | {"marker": ""})
-        measured = drawn if found.itself is None else drawn & found.itself[stiffness, k]
-        panel.plot(x[measured], kept[measured], **look | {"linestyle": "none"})
-        hollow = {"linestyle": "none", "markerfacecolor": "none"}
-        panel.plot(x[drawn & ~measured], kept[drawn & ~measured], **look | hollow)
-    low, high = _floor(data, measure)
+        drawn = (data.evaluations.values[k] > 0) & np.isfinite(costs[stiffness, k])
+        full = np.ones_like(drawn) if found.itself is None else found.itself[stiffness, k]
+        _draw_method(panel, method, costs[stiffness, k][drawn], errors[k][drawn], full[drawn])
     panel.axhspan(low, high, color=style.QUIET, alpha=0.25, linewidth=0)
     panel.axhline(low, color=style.QUIET, linewidth=0.8)
-    panel.set_ylim(_lowest(data, measure) / 2, 2 * _WORST)
-    ground = f"S = {number_format.readable(float(data.stiffness))} kg/s²"
-    panel.set_title(f"{PROBLEMS[found.problem].name}, {ground}")
-    panel.set_xlabel("median wall time [s]" if timed else "force evaluations [1]")
+    panel.set_ylim(lowest / 2, 2 * _WORST)
+    panel.set_title(f"{PROBLEMS[found.problem].name}, {ground_words(stiffness=float(data.stiffness))}")
+    panel.set_xlabel("force evaluations [1]" if found.seconds is None else "median wall time [s]")
 
 
-def _floor(data: xr.Dataset, measure: str) -> tuple[float, float]:
-    low, high = data.floor.values[:, meanings_of(data.measure).index(measure)]
-    return float(low), float(high)
-
-
-def _lowest(data: xr.Dataset, measure: str) -> float:
-    """Return where errors of nothing are drawn: a tenth of the floor, or the least error found."""
-    errors = data[f"{measure}_error"].values
-    return float(np.min(errors[errors > 0], initial=_floor(data, measure)[0])) / 10
-
-
-def _legend(rows: list[Found]) -> list[Any]:
-    names = list(dict.fromkeys(name for found in rows for name in found.methods))
-    lines: list[Any] = list(effort_ladder.handles(names))
-    lines.append(Patch(color=style.QUIET, alpha=0.25, label="round-off: in the launch (line) … in a contact's depth"))
-    if any(found.seconds is not None for found in rows):
-        hollow: Any = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": style.QUIET}
-        lines.append(Line2D([], [], label="hollow: time per step × steps", **hollow))
-    return lines
+def _costs_panel(panel: Any, found: Found, measure: str, bound: float) -> None:
+    stiffness = found.data.stiffness.values
+    for method in found.methods:
+        costs = [found.cost(method, i, measure, bound, timed=found.seconds is not None) for i in range(len(stiffness))]
+        values, tried = np.array([cost.value for cost in costs]), np.array([cost.tried for cost in costs])
+        _draw_method(panel, method, stiffness, values, np.array([cost.reached for cost in costs]))
+        beyond, known = np.isnan(values), np.flatnonzero(np.isfinite(values))
+        panel.plot(stiffness[beyond], tried[beyond], **method_looks.look(method) | _MORE | {"linestyle": "none"})
+        if method == _LAW_OF and known.size:
+            law = values[known[0]] * np.sqrt(stiffness / stiffness[known[0]])
+            panel.plot(stiffness, law, color=style.INK, linestyle=":", linewidth=1.0, zorder=1)

@@ -1,11 +1,10 @@
-"""What was found of engines, as tables: their contacts, how long their steps may be, and how many they do a second."""
+"""Engines in tables: their contacts, how long their steps may be, and how many they take in a second."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +17,10 @@ from stiffdice.experiments.engines.single_bounce import OUTCOMES
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
-from stiffdice.report.number_format import readable
-from stiffdice.report.tables import engine_notes
+from stiffdice.report.methods import engines_note, name_of
+from stiffdice.report.number_format import ground_words, readable, scene_of
 from stiffdice.scene import scene as scenes
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines import stepper
-from stiffdice.simulation.engines.registry import PEERS
 
 # A ratio that differs from one by less is right.
 _RIGHT = 1e-3
@@ -35,6 +32,8 @@ OFF = (0.05, 0.1)
 GAIN = 0.02
 # A nudge of a cube at rest, a hundredth of the sag, that has grown more lifts it off the ground.
 GROWTH = 100.0
+
+OURS = "symplectic_euler"
 
 _SHORT = {
     "rest_depth": "depth at rest",
@@ -60,19 +59,14 @@ def contact(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
             there = found.isel(method=k, stiffness=s, damping=d)
             off = {ratio: there[ratio].values[order] - 1 for ratio in RATIOS}
             row = [name_of(name), readable(float(there.stiffness)), f"{float(there.damping):g}"]
-            rows.append([*row, *(", ".join(map(_percent, off[ratio])) for ratio in RATIOS), _said(off, values)])
+            rows.append([*row, *(", ".join(map(_percent, off[ratio])) for ratio in RATIOS), _what_is_off(off, values)])
     note = (
         f"By how much what was found differs from what is exact, at ωh = {' and '.join(f'{part:g}' for part in values)}"
         "; — where the cube did not leave the ground. Depth at rest: over m g/(4S), the mean of ten periods. "
         "Restitution: of a flat bounce, the mean over phases of the step. Friction: horizontal over normal impulse, "
-        f"over mu. What is off by less than {_RIGHT:.1%} is not said. {engine_notes.line([found])}"
+        f"over mu. What is off by less than {_RIGHT:.1%} is left out. {engines_note([found])}"
     )
     return rendered(title, [*columns, "what is off"], rows, note)
-
-
-def name_of(method: str) -> str:
-    """Return a method's name as a person reads it."""
-    return PEERS[method].name if method in PEERS else method.replace("_", " ")
 
 
 def _percent(part: float) -> str:
@@ -81,7 +75,7 @@ def _percent(part: float) -> str:
     return "0" if abs(part) < 5e-7 else f"{100 * part:+.2g} %".replace("-", "−")
 
 
-def _said(off: Mapping[str, Array], omega_h: list[float]) -> str:
+def _what_is_off(off: Mapping[str, Array], omega_h: list[float]) -> str:
     """Return what is off at the shortest step, and whether a shorter one would help; omega_h: ascending."""
     parts = []
     for name, values in off.items():
@@ -123,18 +117,6 @@ def within(found: xr.Dataset, method: int, off: float) -> npt.NDArray[np.bool_]:
     return np.asarray((np.abs(ratio - 1) <= off).all(axis=1))
 
 
-def gains_not(found: xr.Dataset, method: int) -> npt.NDArray[np.bool_]:
-    """Return at which ωh no phase leaves the cube more energy than GAIN above the exact, shape (omega_h,)."""
-    ratio = np.nan_to_num(found.restitution.values[method], nan=0.0) / float(found.exact_restitution)
-    return np.asarray((ratio**2 <= 1 + GAIN).all(axis=1))
-
-
-def whole(found: xr.Dataset, method: int) -> npt.NDArray[np.bool_]:
-    """Return at which ωh no cube sinks through the ground or leaves the range of doubles, shape (omega_h,)."""
-    grave = [OUTCOMES.index(name) for name in ("sinks", "blows_up")]
-    return np.asarray(np.isin(found.outcome.values[method], grave, invert=True).all(axis=1))
-
-
 def limits(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
     """Return a row for each method: how long its step may be by each criterion, and what happens beyond.
 
@@ -144,31 +126,36 @@ def limits(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
     omega_h = found.omega_h.values
     rows = []
     for k, name in enumerate(meanings_of(found.method)):
-        limits = [limit_of(omega_h, within(found, k, off)) for off in OFF]
-        limits += [limit_of(omega_h, gains_not(found, k)), limit_of(omega_h, whole(found, k))]
-        limits.append(limit_of(omega_h, found.rest_growth.values[k] <= GROWTH))
-        rows.append([name_of(name), *map(str, limits), beyond(found, k), cannot(name)])
+        ratio = found.restitution.values[k] / float(found.exact_restitution)
+        grave = np.isin(found.outcome.values[k], [OUTCOMES.index("sinks"), OUTCOMES.index("blows_up")])
+        passed = [
+            *(within(found, k, off) for off in OFF),
+            (np.nan_to_num(ratio, nan=0.0) ** 2 <= 1 + GAIN).all(axis=1),
+            ~grave.any(axis=1),
+            found.rest_growth.values[k] <= GROWTH,
+        ]
+        limits = [str(limit_of(omega_h, part)) for part in passed]
+        rows.append([name_of(name), *limits, beyond(found, k), cannot(name)])
     columns = ["method", *(f"e within {off:.0%}" for off in OFF), f"no energy gain above {GAIN:.0%}"]
     columns += ["whole", "stays at rest", "beyond", "cannot represent"]
-    scene = scenes.from_mapping(json.loads(found.attrs["scene"]))
+    ground = scene_of(found)["ground"]
     note = (
         f"The longest ωh of {len(omega_h)} from {omega_h[0]:g} to {omega_h[-1]:g} up to which each of them passes, at "
         f"all of {found.sizes['phase']} phases of the step at touch-down. One flat bounce without friction, "
-        f"S = {readable(scene.ground.stiffness)} kg/s², D = {scene.ground.damping:g} kg/s, exact restitution "
+        f"{ground_words(stiffness=ground['stiffness'], damping=ground['damping'])}, exact restitution "
         f"{float(found.exact_restitution):.6g}. Whole: it neither sinks through nor leaves the range of doubles. Stays "
         f"at rest: a nudge by a hundredth of its depth grows less than {GROWTH:g}-fold in 200 steps. "
-        f"{engine_notes.line([found])}"
+        f"{engines_note([found])}"
     )
     return rendered(title, columns, rows, note)
 
 
 def beyond(found: xr.Dataset, method: int) -> str:
     """Return what happens to bounces of a method from where they are off by more than a tenth, in words."""
-    omega_h, kept = found.omega_h.values, within(found, method, OFF[-1])
-    limit = limit_of(omega_h, kept)
-    if math.isnan(limit.fails):
+    omega_h, passed = found.omega_h.values, within(found, method, OFF[-1])
+    if passed.all():
         return "nothing up to the end of the scan"
-    first = int(np.argmax(omega_h == limit.fails))
+    first = int(np.argmin(passed))
     ratio = found.restitution.values[method] / float(found.exact_restitution)
     there = ratio[first:]
     parts = []
@@ -189,22 +176,13 @@ def beyond(found: xr.Dataset, method: int) -> str:
     return "; ".join(parts)
 
 
-def _listed() -> Scene:
-    return scenes.from_mapping({"launch": {"angular_momentum": [0.3, 0.5, 0.2]}}, "as_listed")
-
-
-def _tilted() -> Scene:
-    return scenes.from_mapping({"ground": {"normal": [0.2, 0.0, 1.0]}}, "as_written")
-
-
-# Scenes by what is peculiar to them, and the model that they are asked of.
-_SCENES = {
-    "the listings' law (ungated)": (_listed, "tumbling"),
-    "tilted ground": (_tilted, BOUNCE_MODEL),
+# Scenes by what is peculiar to them: keys, preset and model.
+_SCENES: dict[str, tuple[dict[str, Any], str, str]] = {
+    "the listings' law (ungated)": ({"launch": {"angular_momentum": [0.3, 0.5, 0.2]}}, "as_listed", "tumbling"),
+    "tilted ground": ({"ground": {"normal": [0.2, 0.0, 1.0]}}, "as_written", BOUNCE_MODEL),
 }
 
-
-# What an engine takes and makes something else of; its adapter says more.
+# What an engine represents otherwise; its adapter says more.
 _OTHERWISE = {
     "mujoco": "friction at the node: its acts half way down to the surface",
     "pybullet": "friction along the slip of a cube that turns: its points elsewhere",
@@ -214,8 +192,12 @@ _OTHERWISE = {
 
 def cannot(method: str) -> str:
     """Return what of the paper's scenes a method cannot represent, in words."""
-    found = [words for words, (scene, model) in _SCENES.items() if stepper.unfit(method, scene(), model) is not None]
-    return "; ".join([*found, *([_OTHERWISE[method]] if method in _OTHERWISE else [])]) or "—"
+    unfit = [
+        words
+        for words, (keys, preset, model) in _SCENES.items()
+        if stepper.unfit(method, scenes.from_mapping(keys, preset), model) is not None
+    ]
+    return "; ".join([*unfit, *([_OTHERWISE[method]] if method in _OTHERWISE else [])]) or "—"
 
 
 def speed(timings: Mapping[str, xr.Dataset], title: str) -> Table:
@@ -239,13 +221,10 @@ def speed(timings: Mapping[str, xr.Dataset], title: str) -> Table:
     note = (
         f"Medians of {found.attrs['rounds']} interleaved rounds, of {found.attrs['steps']:,} steps each, on one thread "
         f"of {found.attrs['machine_processor']}; what took long, once. Ours: {name_of(OURS)}, plain stepping. Engines "
-        f"are started before the clock is. Spread: half the range between the quartiles. {engine_notes.line([found])}"
+        f"are started before the clock is. Spread: half the range between the quartiles. {engines_note([found])}"
     )
     return rendered(title, [*columns, "spread"], rows, note)
 
 
-OURS = "symplectic_euler"
-
-
 def _count(value: float) -> str:
-    return "—" if math.isnan(value) else readable(float(f"{value:.2g}"))
+    return "—" if math.isnan(value) else readable(value, digits=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -17,6 +16,7 @@ from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
+from stiffdice.report.number_format import scene_of
 from stiffdice.scene import scene as scenes
 from stiffdice.sweep.stability_limits import edges
 
@@ -41,7 +41,7 @@ def table(sweeps: Mapping[str, xr.Dataset], title: str) -> Table:
     stiffness = _common_stiffness(list(sweeps.values()))
     _refuse_strangers(sweeps)
     first = next(iter(sweeps.values()))
-    scene = scenes.from_mapping(json.loads(first.attrs["scene"])).with_ground(stiffness=stiffness)
+    scene = scenes.from_mapping(scene_of(first)).with_ground(stiffness=stiffness)
 
     def omega_h(steps: float) -> float:
         return linear_theory.omega_h(scene, steps)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 
 import xarray as xr
@@ -10,7 +9,7 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
-from stiffdice.report.number_format import readable
+from stiffdice.report.number_format import readable, scene_of
 from stiffdice.scene import scene as scenes
 from stiffdice.scene.scene import Scene
 
@@ -51,17 +50,13 @@ def table(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
     """
     (found,) = experiments.values()
     rows = [
-        [_ROWS[name][0], _ROWS[name][1], _short(predicted), _short(measured), _ROWS[name][2]]
+        [_ROWS[name][0], _ROWS[name][1], readable(predicted, 3), readable(measured, 3), _ROWS[name][2]]
         for name, predicted, measured in zip(
             meanings_of(found.limit), found.predicted.values.tolist(), found.measured.values.tolist(), strict=True
         )
     ]
-    scene = scenes.from_mapping(json.loads(found.attrs["scene"]))
+    scene = scenes.from_mapping(scene_of(found))
     return rendered(title, ["limit", "formula", "predicted", "measured", "unit"], rows, _note(found, scene))
-
-
-def _short(value: float) -> str:
-    return readable(float(f"{value:.3g}"))
 
 
 def _note(found: xr.Dataset, scene: Scene) -> str:

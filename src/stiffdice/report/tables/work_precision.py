@@ -15,7 +15,8 @@ from stiffdice.experiments.work_precision.effort import fixed_step
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
-from stiffdice.report.number_format import readable
+from stiffdice.report.methods import name_of
+from stiffdice.report.number_format import duration, readable
 from stiffdice.simulation.engines.registry import PEERS, SOLVERS
 
 # The errors to which costs are told.
@@ -94,21 +95,16 @@ def seconds_of(found: xr.Dataset, timed: xr.Dataset) -> tuple[Array, Array]:
 
 def _matched(rungs: xr.Dataset, timed: xr.Dataset) -> tuple[Array, Array]:
     """Return seconds of the rungs of one method on one ground, and whether they were timed themselves."""
-    there = {
-        (int(steps), f"{tolerance:.6g}"): float(seconds)
-        for steps, tolerance, seconds in zip(
-            timed.steps.values, timed.tolerance.values, timed.seconds.values, strict=True
-        )
-        if np.isfinite(seconds)
-    }
-    keys = [
-        (int(n), f"{tolerance:.6g}") for n, tolerance in zip(rungs.steps.values, rungs.tolerance.values, strict=True)
-    ]
-    done = rungs.evaluations.values > 0
-    itself = np.array([key in there for key in keys]) & done
-    per_step = float(timed.seconds_per_step)
-    seconds = np.array([there.get(key, key[0] * per_step) for key in keys])
-    return np.where(done, seconds, np.nan), itself
+    measured = {key: time for key, time in zip(_keys(timed), timed.seconds.values, strict=True) if np.isfinite(time)}
+    keys, done = _keys(rungs), rungs.evaluations.values > 0
+    seconds = np.array([measured.get(key, key[0] * float(timed.seconds_per_step)) for key in keys])
+    return np.where(done, seconds, np.nan), np.array([key in measured for key in keys]) & done
+
+
+def _keys(rungs: xr.Dataset) -> list[tuple[int, str]]:
+    """Return steps and tolerance of each rung."""
+    pairs = zip(rungs.steps.values, rungs.tolerance.values, strict=True)
+    return [(int(steps), f"{tolerance:.6g}") for steps, tolerance in pairs]
 
 
 class Found(NamedTuple):
@@ -159,11 +155,6 @@ def found_in(data: Iterable[xr.Dataset]) -> list[Found]:
     return found
 
 
-def ours(methods: Sequence[str]) -> list[str]:
-    """Return the schemes among methods."""
-    return [name for name in methods if name not in PEERS]
-
-
 def best(found: Found, methods: Sequence[str], stiffness: int, bound: float, *, timed: bool) -> tuple[str, float]:
     """Return the method that reaches an error of the position at the least cost, and it; ("", NaN) if none does."""
     tried = [name for name in methods if name in found.methods]
@@ -190,29 +181,22 @@ def table(data: Mapping[str, xr.Dataset], title: str) -> Table:
 
 _NOTE = (
     "Error: root mean square distance of the centre from the reference, in radii; the cost is the least from which on "
-    "it stays below. Only what was reached is told. Evaluations are of the force, in plain stepping; times are medians "
-    "of warm runs."
+    "it stays below. Only what was reached is listed. Evaluations are of the force, in plain stepping; times are "
+    "medians of warm runs."
 )
 
 
 def _compared(found: Found, stiffness: int, bound: float, *, timed: bool) -> list[str]:
-    name, cost = best(found, ours(found.methods), stiffness, bound, timed=timed)
-    peer, peers_cost = best(found, [name for name in found.methods if name in SOLVERS], stiffness, bound, timed=timed)
-    unit = duration if timed else lambda value: f"{value:,.0f}"
-    ratio = f"{peers_cost / cost:.3g}" if cost and math.isfinite(peers_cost / cost) else "—"
+    schemes = [name for name in found.methods if name not in PEERS]
+    both = [best(found, methods, stiffness, bound, timed=timed) for methods in (schemes, list(SOLVERS))]
+    (_, ours), (_, theirs) = both
     return [
-        f"{unit(cost)} ({name.replace('_', ' ')})" if name else "none reaches it",
-        f"{unit(peers_cost)} ({PEERS[peer].name})" if peer else "none reaches it",
-        ratio,
+        *(
+            f"{duration(cost) if timed else f'{cost:,.0f}'} ({name_of(name)})" if name else "none reaches it"
+            for name, cost in both
+        ),
+        f"{theirs / ours:.3g}" if ours and math.isfinite(theirs / ours) else "—",
     ]
-
-
-def duration(seconds: float) -> str:
-    """Return a time as a person writes it."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
 
 
 def targets(data: Mapping[str, xr.Dataset], title: str) -> Table:

@@ -9,19 +9,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.experiments.engines.single_bounce import OUTCOMES
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import effort_ladder, style
-from stiffdice.report.tables import engine_notes
+from stiffdice.report.figures import style
+from stiffdice.report.methods import engines_note, name_of
 from stiffdice.report.tables.engines import OFF, limit_of, within
 
 _COLUMNS = 3
-# Restitutions above are told by an arrow.
+# Restitutions above are given by an arrow.
 _HIGHEST = 3.2
 
 
@@ -37,7 +35,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels = figure.subplots(lines, _COLUMNS, sharex=True, sharey=True, squeeze=False)
     for k, (name, panel) in enumerate(zip(names, panels.flat, strict=False)):
         _panel(panel, found.isel(method=k), limit_of(found.omega_h.values, within(found, k, OFF[-1])).passes)
-        panel.set_title(effort_ladder.name_of(name))
+        panel.set_title(name_of(name))
     for panel in panels.flat[len(names) :]:
         panel.set_axis_off()
     for panel in panels.flat[max(0, len(names) - _COLUMNS) : len(names)]:
@@ -46,7 +44,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for line in panels:
         line[0].set_ylabel("restitution e [1]")
     figure.legend(handles=_legend(), loc="outside right center")
-    style.add_note(figure, engine_notes.line([found]))
+    style.add_note(figure, engines_note([found]))
     return figure
 
 
@@ -58,19 +56,18 @@ def _panel(panel: Any, found: xr.Dataset, limit: float) -> None:
     low[left], high[left] = np.nanmin(restitution[left], axis=1), np.nanmax(restitution[left], axis=1)
     panel.set_xscale("log")
     panel.axhspan(exact * (1 - OFF[-1]), exact * (1 + OFF[-1]), color=style.FAINT, alpha=0.7, linewidth=0)
-    panel.axhline(exact, color=style.INK, linewidth=0.9, linestyle="--")
+    panel.axhline(exact, **style.THEORY)
     panel.axvline(linear_theory.STABILITY_LIMIT, color=style.VERMILION, linewidth=1.0, linestyle=":")
     panel.fill_between(omega_h, low, high, color=style.BLUE, alpha=0.35, linewidth=0)
     for edge in (low, high):
         panel.plot(omega_h, edge, color=style.BLUE, linewidth=1.0)
     stays = (found.outcome.values != OUTCOMES.index("leaves")).any(axis=1)
-    panel.plot(omega_h, np.where(stays, 0.0, np.nan), **_STAYS)
+    panel.plot(omega_h, np.where(stays, 0.0, np.nan), linestyle="none", **_STAYS)
     if not math.isnan(limit) and limit < omega_h[-1]:
         panel.axvline(limit, color=style.GREEN, linewidth=1.2)
     top = float(np.nanmax(high))
     if top > _HIGHEST:
-        told = f"↑ to e = {top:.3g}\nat ωh = {omega_h[int(np.nanargmax(high))]:.3g}"
-        panel.text(0.03, 0.95, told, transform=panel.transAxes, ha="left", va="top", fontsize=7.5)
+        style.write_in_corner(panel, 0.03, f"↑ to e = {top:.3g}\nat ωh = {omega_h[int(np.nanargmax(high))]:.3g}")
     panel.set_ylim(-0.12, _HIGHEST)
     panel.set_xlim(omega_h[0], omega_h[-1])
     panel.xaxis.set_major_locator(FixedLocator([0.02, 0.1, 0.5, 2, 10]))
@@ -78,15 +75,15 @@ def _panel(panel: Any, found: xr.Dataset, limit: float) -> None:
     panel.xaxis.set_minor_formatter(NullFormatter())
 
 
-_STAYS: dict[str, Any] = {"linestyle": "none", "marker": "x", "markersize": 5, "color": style.INK}
+_STAYS: dict[str, Any] = {"marker": "x", "markersize": 5, "color": style.INK}
 
 
 def _legend() -> list[Any]:
     return [
-        Patch(color=style.BLUE, alpha=0.35, label="least to most over\nthe phases of the step\nat touch-down"),
-        Line2D([], [], color=style.INK, linewidth=0.9, linestyle="--", label="exact"),
-        Patch(color=style.FAINT, label=f"within {OFF[-1]:.0%} of it"),
-        Line2D([], [], color=style.GREEN, label="all phases within,\nup to here"),
-        Line2D([], [], color=style.VERMILION, linestyle=":", label="ωh = 2: symplectic Euler's\nlimit of stability"),
-        Line2D([], [], label="at some phase it does\nnot leave the ground", **_STAYS),
+        style.area("least to most over\nthe phases of the step\nat touch-down", style.BLUE, alpha=0.35),
+        style.line("exact", **style.THEORY),
+        style.area(f"within {OFF[-1]:.0%} of it", style.FAINT),
+        style.line("all phases within,\nup to here", color=style.GREEN),
+        style.line("ωh = 2: symplectic Euler's\nlimit of stability", color=style.VERMILION, linestyle=":"),
+        style.mark("at some phase it does\nnot leave the ground", **_STAYS),
     ]

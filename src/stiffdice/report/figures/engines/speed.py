@@ -11,9 +11,9 @@ from matplotlib.patches import Patch
 
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
-from stiffdice.report.figures import effort_ladder, style
-from stiffdice.report.tables import engine_notes
+from stiffdice.report.figures import style
+from stiffdice.report.methods import engines_note, name_of
+from stiffdice.report.number_format import readable
 from stiffdice.simulation.engines import stepper
 
 _COLORS = (style.BLUE, style.ORANGE)
@@ -36,9 +36,9 @@ def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
             across = place + (len(problems) - 1 - 2 * p) / 2 * thick
             hatch = _HATCH if stepper.own_steps(names[k]) else None
             panel.barh(across, rates[p, k], thick, color=_COLORS[p], hatch=hatch, edgecolor="white", linewidth=0.5)
-            told = number_format.readable(float(f"{rates[p, k]:.2g}"))
-            panel.annotate(told, (rates[p, k], across), (3, 0), textcoords="offset points", va="center", fontsize=7.5)
-    panel.set_yticks(range(len(names)), [effort_ladder.name_of(names[k]) for k in order])
+            text = readable(rates[p, k], digits=2)
+            style.write_beside(panel, text, (rates[p, k], across), (3, 0), va="center", fontsize=7.5)
+    panel.set_yticks(range(len(names)), [name_of(names[k]) for k in order])
     panel.set(xscale="log", xlabel="steps a second [1/s]")
     panel.set_xlim(np.nanmin(rates) / 3, np.nanmax(rates) * 5)
     panel.grid(visible=False, axis="y")
@@ -48,5 +48,5 @@ def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     )
     panel.legend(handles=handles, loc="lower right")
     machine = f"One thread of {found.attrs['machine_processor']}, medians of warm runs."
-    style.add_note(figure, f"{machine} {engine_notes.line([found])}")
+    style.add_note(figure, f"{machine} {engines_note([found])}")
     return figure

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
-from stiffdice.report.figures import effort_ladder, style
-from stiffdice.report.tables import engine_notes
+from stiffdice.report.figures import method_looks, style
+from stiffdice.report.methods import engines_note, name_of
+from stiffdice.report.number_format import readable
 
 # Distances below are drawn as this, those above mean nothing more [m].
 _SPAN = 1e-12, 1e1
+_REFERENCE: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.35}
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
@@ -29,12 +29,10 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     _heights(left, found, names)
     _distances(middle, found, names)
     _efforts(right, found, names, contact)
-    reference = Line2D(
-        [], [], color=style.INK, linewidth=2.5, alpha=0.35, label=f"reference:\n{found.attrs['reference']}"
-    )
-    figure.legend(handles=[reference, *effort_ladder.handles(names)], loc="outside right center")
+    reference = style.line(f"reference:\n{found.attrs['reference']}", **_REFERENCE)
+    figure.legend(handles=[reference, *method_looks.handles(names)], loc="outside right center")
     unfit = found.attrs.get("unfit", "")
-    note = " ".join([_steps(found, names), engine_notes.line([found]), f"Cannot: {unfit}." if unfit else ""])
+    note = " ".join([_steps(found, names), engines_note([found]), f"Cannot: {unfit}." if unfit else ""])
     style.add_note(figure, note.strip())
     return figure
 
@@ -48,14 +46,10 @@ def _first_contact(found: xr.Dataset) -> int:
     return low + 1 + int(later[0]) if later.size else len(height) - 1
 
 
-def _look(method: str) -> dict[str, Any]:
-    return effort_ladder.look(method) | {"marker": ""}
-
-
 def _heights(panel: Any, found: xr.Dataset, names: list[str]) -> None:
-    panel.plot(found.time, found.reference_position.values[:, 2], color=style.INK, linewidth=2.5, alpha=0.35)
+    panel.plot(found.time, found.reference_position.values[:, 2], **_REFERENCE)
     for k, name in enumerate(names):
-        panel.plot(found.time, found.position.values[k, -1, :, 2], **_look(name))
+        panel.plot(found.time, found.position.values[k, -1, :, 2], **method_looks.look(name) | {"marker": ""})
     panel.set(xlabel="time [s]", ylabel="height of the centre [m]")
     panel.set_title("height, at the most effort")
     low, high = np.nanmin(found.reference_position.values[:, 2]), np.nanmax(found.reference_position.values[:, 2])
@@ -64,12 +58,11 @@ def _heights(panel: Any, found: xr.Dataset, names: list[str]) -> None:
 
 def _distances(panel: Any, found: xr.Dataset, names: list[str]) -> None:
     panel.set_yscale("log")
-    panel.fill_between(
-        found.time, _SPAN[0], np.maximum(found.reference_error, _SPAN[0]), color=style.FAINT, linewidth=0
-    )
+    own = np.maximum(found.reference_error, _SPAN[0])
+    panel.fill_between(found.time, _SPAN[0], own, color=style.FAINT, linewidth=0)
     for k, name in enumerate(names):
         distance = found.distance.values[k, -1]
-        panel.plot(found.time[1:], np.clip(distance[1:], *_SPAN), markevery=0.1, **effort_ladder.look(name))
+        panel.plot(found.time[1:], np.clip(distance[1:], *_SPAN), markevery=0.1, **method_looks.look(name))
     panel.set(xlabel="time [s]", ylabel="distance from the reference [m]")
     panel.set_ylim(_SPAN)
     panel.set_title("distance, at the most effort (grey: the reference's own)")
@@ -78,17 +71,16 @@ def _distances(panel: Any, found: xr.Dataset, names: list[str]) -> None:
 def _efforts(panel: Any, found: xr.Dataset, names: list[str], contact: int) -> None:
     panel.set(xscale="log", yscale="log")
     for k, name in enumerate(names):
-        panel.plot(
-            found.evaluations[k], np.clip(found.distance.values[k, :, contact], *_SPAN), **effort_ladder.look(name)
-        )
+        distance = np.clip(found.distance.values[k, :, contact], *_SPAN)
+        panel.plot(found.evaluations[k], distance, **method_looks.look(name))
     panel.set(xlabel="force evaluations [1]", ylabel="distance from the reference [m]")
     panel.set_title(f"after the first landing, t = {float(found.time[contact]):.2f} s")
 
 
 def _steps(found: xr.Dataset, names: list[str]) -> str:
-    told = []
+    efforts = []
     for k, name in enumerate(names):
         steps, tolerance = int(found.steps[k, -1]), float(found.tolerance[k, -1])
-        effort = f"{number_format.readable(steps)} steps" if steps else f"tolerance {number_format.readable(tolerance)}"
-        told.append(f"{effort_ladder.name_of(name)} {effort}")
-    return f"At the most: {', '.join(told)}."
+        effort = f"{readable(steps)} steps" if steps else f"tolerance {readable(tolerance)}"
+        efforts.append(f"{name_of(name)} {effort}")
+    return f"At the most: {', '.join(efforts)}."

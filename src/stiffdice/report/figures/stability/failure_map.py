@@ -1,4 +1,4 @@
-"""The atlas of where and how runs fail: a map for each number of the scene and contact law, verdicts over steps."""
+"""Where and how runs fail: a map for each number of the scene and contact law, verdicts over steps."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ import numpy as np
 import xarray as xr
 from matplotlib import patheffects
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import readable
 from stiffdice.simulation.outcome import Verdict
 
 _NAMES = {
-    "stiffness": "stiffness S [kg/s²]",
+    "stiffness": style.STIFFNESS,
     "damping": "damping D [kg/s]",
     "friction": "friction coefficient μ [1]",
     "mass": "mass m [kg]",
@@ -67,23 +66,22 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 
 def _map(panel: Any, dataset: xr.Dataset, law: int) -> None:
     steps, heights = dataset.steps.values, _rows(dataset)
-    edges = _edges(np.log10(steps))
+    edges = style.borders(steps, logarithmic=True)
     step = _height(heights)
     names = meanings_of(dataset.verdict)
     for height, verdicts in zip(heights, dataset.verdict.values[law], strict=True):
         changes = np.flatnonzero(np.diff(verdicts)) + 1
         for first, last in zip([0, *changes], [*changes, len(verdicts)], strict=True):
-            left, right = 10.0 ** edges[[first, last]]
+            left, right = edges[[first, last]]
             place = {"xy": (left, height - step / 2), "width": right - left, "height": step}
             panel.add_patch(Rectangle(**place, **_fill(names[verdicts[first]])))
     for name, limits in zip(meanings_of(dataset.limit), dataset.limit_steps.values[:, law], strict=True):
         _limit(panel, heights, limits, name)
-    panel.set(xscale="log", xlim=10 ** edges[[0, -1]], ylim=(heights.min() - step / 2, heights.max() + step / 2))
+    panel.set(xscale="log", xlim=edges[[0, -1]], ylim=(heights.min() - step / 2, heights.max() + step / 2))
     panel.grid(visible=False)
     panel.set_yticks(*_ticks(dataset, heights))
     panel.set_xlabel("time steps [1]")
-    contact = meanings_of(dataset.contact)[law]
-    panel.set_title(f"{dataset.attrs['axis']}, {style.LAW_NAMES[contact]}")
+    panel.set_title(f"{dataset.attrs['axis']}, {style.law_of(dataset.isel(contact=law))}")
 
 
 def _fill(verdict: str) -> dict[str, Any]:
@@ -111,14 +109,6 @@ def _height(heights: Array) -> float:
     return float(np.diff(np.sort(heights)).min()) if len(heights) > 1 else 1.0
 
 
-def _edges(centres: Array) -> Array:
-    """Return the edges of cells around these, half way to the next."""
-    if len(centres) == 1:
-        return np.array([centres[0] - 0.25, centres[0] + 0.25])
-    middle = (centres[1:] + centres[:-1]) / 2
-    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
-
-
 def _limit(panel: Any, heights: Array, limits: Array, name: str) -> None:
     """Draw a limit, a line through all numbers but zero and a stroke for each row that stands alone."""
     step = _height(heights)
@@ -140,7 +130,7 @@ def _ticks(dataset: xr.Dataset, heights: Array) -> tuple[Array, list[str]]:
     if len(heights) > 12:
         numbers = np.flatnonzero(value.values > 0)
         shown = np.concatenate([np.flatnonzero(value.values == 0), numbers[:: math.ceil(len(numbers) / 8)]])
-    return heights[shown], [number_format.readable(float(value.values[k])) for k in shown]
+    return heights[shown], [readable(float(value.values[k])) for k in shown]
 
 
 def _legend(found: list[xr.Dataset]) -> list[Any]:
@@ -154,5 +144,5 @@ def _legend(found: list[xr.Dataset]) -> list[Any]:
     limits = meanings_of(found[0].limit)
     for name, look in _LIMIT_LOOKS.items():
         if any(np.isfinite(dataset.limit_steps.values[limits.index(name)]).any() for dataset in found):
-            handles.append(Line2D([], [], color=style.INK, linewidth=1.3, **look))
+            handles.append(style.line(color=style.INK, linewidth=1.3, **look))
     return handles

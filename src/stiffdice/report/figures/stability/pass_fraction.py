@@ -1,29 +1,27 @@
-"""The comb: at one stiffness, numbers of steps that pass between numbers that fail."""
+"""Pass fractions: at one stiffness, numbers of steps that pass between numbers that fail."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words, scene_of
 
 # The paper's step counts at high stiffness, by the figures that show them; and that stiffness [kg/s²] and duration [s].
 PAPER_STEPS = {"figures 9 and 10": 10_000, "figures 11 and 12": 20_000}
 PAPER_SCENE = 1e6, 10.0
-_PAPER_LOOK: dict[str, Any] = {"linestyle": "none", "marker": "^", "color": style.INK, "markersize": 6}
+_PAPER_LOOK: dict[str, Any] = {"marker": "^", "color": style.INK, "markersize": 6}
 
 _OMEGA_H = (4.0, 3.0, 2.0, 1.5, 1.2, 1.0, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
 
+_MAGIC_LOOK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8, "linestyle": ":"}
 # Magic steps beyond this n are not drawn: they lie too close.
 _LAST = 12
 
@@ -48,8 +46,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     steps = np.concatenate([scan.cell_steps.values for scan in scans])
     room = 0.02 * (steps.max() - steps.min())
     panels[-1].set(xlim=(steps.min() - room, steps.max() + 2 * room), ylim=(-0.08, 1.18), yticks=np.linspace(0, 1, 6))
-    duration = json.loads(scans[0].attrs["scene"])["duration"]
-    panels[-1].set_xlabel(f"time steps in {duration:g} s [1]")
+    panels[-1].set_xlabel(f"time steps in {scene_of(scans[0])['duration']:g} s [1]")
     panels[-1].xaxis.set_major_formatter("{x:,.0f}")
     figure.legend(handles=_legend(scans), loc="outside lower center", ncols=3)
     return figure
@@ -73,9 +70,8 @@ def _shares(panel: Any, scan: xr.Dataset) -> None:
     steps = scan.cell_steps.values
     for name, found in _criteria(scan)[0].items():
         color = style.CRITERION_LOOKS[name]["color"]
-        panel.fill_between(
-            steps, found.pass_fraction_low, found.pass_fraction_high, color=color, alpha=0.12, linewidth=0, zorder=1.5
-        )
+        band = {"color": color, "alpha": 0.12, "linewidth": 0, "zorder": 1.5}
+        panel.fill_between(steps, found.pass_fraction_low, found.pass_fraction_high, **band)
         panel.plot(steps, found.pass_fraction, color=color, linewidth=_width(name), label=name, zorder=2.5)
 
 
@@ -87,69 +83,44 @@ def _theory(panel: Any, scan: xr.Dataset) -> None:
     """Mark what theory says of some step counts, and those that the paper took."""
     steps = scan.cell_steps.values
     product = float(scan.cell_omega_h[0] * scan.cell_steps[0])  # ωh times steps is the same for all
-    marks = {
-        f"n = {n}": step
-        for n, step in linear_theory.magic_steps(product / steps[-1], product / steps[0], _LAST).items()
-    }
-    for name, omega_h in marks.items():
-        panel.axvline(product / omega_h, color=style.INK, linewidth=0.8, linestyle=":", zorder=2)
-        _label(panel, product / omega_h, name)
+    magic = linear_theory.magic_steps(product / steps[-1], product / steps[0], _LAST)
+    marks = [(product / omega_h, f"n = {n}", _MAGIC_LOOK) for n, omega_h in magic.items()]
     limit = product / linear_theory.STABILITY_LIMIT
     if steps[0] <= limit <= steps[-1]:
-        panel.axvline(limit, color=style.INK, linewidth=1.0, linestyle="--", zorder=2)
-        _label(panel, limit, "ωh = 2")
+        marks.append((limit, "ωh = 2", style.THEORY))
+    for place, name, look in marks:
+        panel.axvline(place, zorder=2, **look)
+        style.write_beside(panel, name, (place, 1.17), (3, 0), va="top", fontsize=7.5, color=style.INK)
     taken = [count for count in PAPER_STEPS.values() if _of_the_paper(scan) and steps[0] <= count <= steps[-1]]
-    panel.plot(taken, [-0.05] * len(taken), **_PAPER_LOOK)
+    panel.plot(taken, [-0.05] * len(taken), linestyle="none", **_PAPER_LOOK)
     shown = [value for value in _OMEGA_H if steps[0] <= product / value <= steps[-1]]
     top = style.top_axis(panel, [product / value for value in shown], [f"{value:g}" for value in shown])
     top.set_xlabel("ωh of a flat landing [1]", fontsize=7.5)
 
 
-def _label(panel: Any, steps: float, text: str) -> None:
-    panel.annotate(
-        text,
-        (steps, 1.17),
-        xytext=(3, 0),
-        textcoords="offset points",
-        ha="left",
-        va="top",
-        fontsize=7.5,
-        color=style.INK,
-    )
-
-
 def _of_the_paper(scan: xr.Dataset) -> bool:
-    return (float(scan.cell_stiffness[0]), json.loads(scan.attrs["scene"])["duration"]) == PAPER_SCENE
+    return (float(scan.cell_stiffness[0]), scene_of(scan)["duration"]) == PAPER_SCENE
 
 
 def _named(scan: xr.Dataset) -> str:
-    ground = json.loads(scan.attrs["scene"])["ground"]
-    law = style.LAW_NAMES[meanings_of(scan.cell_contact)[int(scan.cell_contact[0])]] + style.maker_of(scan)
-    passed = _criteria(scan)[1]
-    return (
-        f"{law}, S = {number_format.readable(float(scan.cell_stiffness[0]))} kg/s², "
-        f"D = {number_format.readable(ground['damping'])} kg/s, μ = {number_format.readable(ground['friction'])}"
-        + (f"; all pass: {', '.join(passed)}" if passed else "")
-    )
+    ground, passed = scene_of(scan)["ground"], _criteria(scan)[1]
+    stiffness = float(scan.cell_stiffness[0])
+    numbers = ground_words(stiffness=stiffness, damping=ground["damping"], friction=ground["friction"])
+    all_pass = f"; all pass: {', '.join(passed)}" if passed else ""
+    return f"{style.law_of(scan, 'cell_contact')}, {numbers}{all_pass}"
 
 
 def _legend(scans: Sequence[xr.Dataset]) -> list[Any]:
     pairs = dict.fromkeys(
         (name, float(found.tolerance)) for scan in scans for name, found in _criteria(scan)[0].items()
     )
-    handles: list[Any] = [
-        Line2D(
-            [],
-            [],
-            color=style.CRITERION_LOOKS[name]["color"],
-            linewidth=_width(name),
-            label=style.criterion_words(name, tolerance),
-        )
-        for name, tolerance in pairs
-    ]
-    handles.append(Patch(color=style.QUIET, alpha=0.3, linewidth=0, label="95 % confidence (Wilson)"))
-    handles.append(Line2D([], [], color=style.INK, linewidth=0.8, linestyle=":", label="magic step, ωh = 2 sin(π/2n)"))
+    handles: list[Any] = []
+    for name, tolerance in pairs:
+        look = {"color": style.CRITERION_LOOKS[name]["color"], "linewidth": _width(name)}
+        handles.append(style.line(style.criterion_words(name, tolerance), **look))
+    handles.append(style.area("95 % confidence (Wilson)", style.QUIET, alpha=0.3))
+    handles.append(style.line("magic step, ωh = 2 sin(π/2n)", **_MAGIC_LOOK))
     if any(_of_the_paper(scan) for scan in scans):
         paper = ", ".join(f"{steps:,} ({where})" for where, steps in PAPER_STEPS.items())
-        handles.append(Line2D([], [], label=f"the paper's steps: {paper}", **_PAPER_LOOK))
+        handles.append(style.mark(f"the paper's steps: {paper}", **_PAPER_LOOK))
     return handles

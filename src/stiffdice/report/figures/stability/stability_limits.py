@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import scene_of
 from stiffdice.sweep.stability_limits import EDGES, FIT, band
 
 _MODELS = {
@@ -28,22 +25,19 @@ _MODELS = {
 
 def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return steps against stiffness above, and the same edges as ωh below, a column for each sweep and contact law."""
-    columns = [found.isel(contact=k) for found in sweeps.values() for k in range(found.sizes["contact"])]
+    columns = style.by_law(sweeps.values())
     figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=7.4)
     panels = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
     for (upper, lower), frontier in zip(panels.T, columns, strict=True):
-        law = style.LAW_NAMES[meanings_of(frontier.contact)[int(frontier.contact)]] + style.maker_of(frontier)
-        upper.set_title(
-            law if len(sweeps) == 1 else f"{_MODELS.get(frontier.attrs['model'], frontier.attrs['model'])}, {law}"
-        )
+        model = "" if len(sweeps) == 1 else _MODELS.get(frontier.attrs["model"], frontier.attrs["model"]) + ", "
+        upper.set_title(model + style.law_of(frontier))
         _steps(upper, frontier)
         _omega_h(lower, frontier)
-        lower.set_xlabel("stiffness S [kg/s²]")
+        lower.set_xlabel(style.STIFFNESS)
     notes = max(len(panel.texts) for panel in panels[0])
     panels[0, 0].set_ylim(top=panels[0, 0].get_ylim()[1] * 10 ** (0.12 * notes))  # room for them above the lines
-    duration = json.loads(columns[0].attrs["scene"])["duration"]
-    panels[0, 0].set_ylabel(f"time steps in {duration:g} s [1]")
-    panels[1, 0].set_ylabel("ωh of a flat landing [1]")
+    panels[0, 0].set_ylabel(f"time steps in {scene_of(columns[0])['duration']:g} s [1]")
+    panels[1, 0].set_ylabel(style.OMEGA_H)
     figure.legend(handles=_legend(columns), loc="outside lower center", ncols=3 if len(columns) > 1 else 1)
     return figure
 
@@ -51,7 +45,7 @@ def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
 def _steps(panel: Any, frontier: xr.Dataset) -> None:
     stiffness = frontier.stiffness.values
     panel.set(xscale="log", yscale="log")
-    panel.plot(stiffness, frontier.limit, color=style.INK, linestyle="--", linewidth=1.0, zorder=4)
+    panel.plot(stiffness, frontier.limit, zorder=4, **style.THEORY)
     notes = []
     for criterion, found in _by_criterion(frontier):
         look = style.CRITERION_LOOKS[criterion]
@@ -100,14 +94,12 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
         linewidths=0,
         rasterized=True,  # as a drawing it would be 170 bytes a cell
     )
-    panel.axhline(linear_theory.STABILITY_LIMIT, color=style.INK, linestyle="--", linewidth=1.0)
+    panel.axhline(linear_theory.STABILITY_LIMIT, **style.THEORY)
     scale = frontier.limit.values * linear_theory.STABILITY_LIMIT
     for criterion, found in _by_criterion(frontier):
         first, last = (scale / found[edge].values for edge in ("first_pass", "last_fail"))
         _marks(panel, frontier.stiffness, first, last, style.CRITERION_LOOKS[criterion])
-    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.yaxis.set_major_formatter("{x:g}")
-    panel.yaxis.set_minor_locator(NullLocator())
+    style.plain_log_ticks(panel.yaxis)
 
 
 def _legend(columns: list[xr.Dataset]) -> list[Any]:
@@ -116,10 +108,8 @@ def _legend(columns: list[xr.Dataset]) -> list[Any]:
     hop_height = columns[0].attrs.get("hop_height")
     for criterion, tolerance in tolerances.items():
         look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance, hop_height)
-        common: Any = {"linestyle": "none", "color": look["color"]}
-        open_mark: Any = {"marker": look["first"], "markersize": 5.5, "markerfacecolor": "none"}
-        handles.append(Line2D([], [], label=f"first pass: {words}", **open_mark, **common))
-        handles.append(Line2D([], [], marker=look["last"], markersize=4, label=f"last fail: {words}", **common))
-    handles.append(Line2D([], [], color=style.INK, linestyle="--", label="theory: ωh = 2"))
-    handles.append(Patch(color=style.QUIET, label="scanned cell, darker: more fail"))
-    return handles
+        color, open_mark = look["color"], {"markersize": 5.5, "markerfacecolor": "none"}
+        handles.append(style.mark(f"first pass: {words}", look["first"], color=color, **open_mark))
+        handles.append(style.mark(f"last fail: {words}", look["last"], color=color, markersize=4))
+    handles.append(style.line("theory: ωh = 2", **style.THEORY))
+    return [*handles, style.area("scanned cell, darker: more fail", style.QUIET)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,13 +10,12 @@ import xarray as xr
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report import number_format
 from stiffdice.report.figures import style
+from stiffdice.report.number_format import ground_words, scene_of
 
 # Magic steps beyond these n lie too close for a number each, and for a tick.
 _NUMBERED, _LAST = 6, 40
@@ -30,11 +28,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     logarithms of stiffness and ωh. A criterion that all members pass is told, not drawn; one that is asked at two
     tolerances has two rows; a panel stays empty where a sweep was not asked.
     """
-    columns = [
-        found.isel(contact=k, cell=found.cell_contact.values == found.contact.values[k])
-        for found in sweeps.values()
-        for k in range(found.sizes["contact"])
-    ]
+    columns = [found.isel(cell=found.cell_contact == found.contact) for found in style.by_law(sweeps.values())]
     asked = sorted({pair for found in columns for pair in _asked(found)}, key=_rank)
     passed = [pair for pair in asked if not any((_shares(found, pair) < 1).any() for found in columns)]
     rows = [pair for pair in asked if pair not in passed] or asked
@@ -44,20 +38,19 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
         for panel, found in zip(row, columns, strict=True):
             drawn = _cells(panel, found, _shares(found, pair))
             _theory(panel, found, numbered=panel is row[-1])
-        row[0].set_ylabel(f"{style.criterion_words(*pair)}\nωh of a flat landing [1]")
+        row[0].set_ylabel(f"{style.criterion_words(*pair)}\n{style.OMEGA_H}")
     sides = np.concatenate([_rectangles(found)[..., 0] for found in columns])
     omega_h = np.concatenate([found.cell_omega_h.values for found in columns])
     panels[0, 0].set(xlim=(sides.min(), sides.max()), ylim=(omega_h.min(), omega_h.max()))
     for panel, found in zip(panels[0], columns, strict=True):
         panel.set_title(_named(found), fontsize=8.5)
     for panel in panels[-1]:
-        panel.set_xlabel("stiffness S [kg/s²]")
+        panel.set_xlabel(style.STIFFNESS)
     bar = figure.colorbar(drawn, ax=panels, location="bottom", aspect=50, shrink=0.6, pad=0.02)
     bar.set_label("share of members that pass [1]")
     note = "dashed: ωh = 2; right: magic steps ωh = 2 sin(π/2n), by n; what is narrower than a cell may be missed"
-    style.add_note(
-        figure, note + (f"; not drawn, as all members pass: {', '.join(name for name, _ in passed)}" if passed else "")
-    )
+    note += f"; not drawn, as all members pass: {', '.join(name for name, _ in passed)}" if passed else ""
+    style.add_note(figure, note)
     return figure
 
 
@@ -79,16 +72,8 @@ def _shares(found: xr.Dataset, pair: tuple[str, float]) -> Array:
 
 def _cells(panel: Any, found: xr.Dataset, shares: Array) -> PolyCollection:
     panel.set(xscale="log", yscale="log")
-    rectangles = _rectangles(found)
-    drawn = PolyCollection(
-        list(rectangles),
-        array=shares,
-        norm=Normalize(0, 1),
-        cmap="cividis",
-        antialiased=False,
-        rasterized=True,
-        zorder=1,
-    )
+    look: Any = {"norm": Normalize(0, 1), "cmap": "cividis", "antialiased": False, "rasterized": True, "zorder": 1}
+    drawn = PolyCollection(list(_rectangles(found)), array=shares, **look)
     panel.add_collection(drawn)
     panel.grid(visible=False)
     if np.isnan(shares).all():
@@ -114,9 +99,7 @@ def _rectangles(found: xr.Dataset) -> Array:
 def _theory(panel: Any, found: xr.Dataset, *, numbered: bool) -> None:
     """Draw the limit, and ticks on the right at the magic steps, with their n if `numbered`."""
     panel.axhline(linear_theory.STABILITY_LIMIT, color="white", linestyle="--", linewidth=1.0)
-    panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    panel.yaxis.set_major_formatter("{x:g}")
-    panel.yaxis.set_minor_locator(NullLocator())
+    style.plain_log_ticks(panel.yaxis)
     magic = linear_theory.magic_steps(found.cell_omega_h.values.min(), found.cell_omega_h.values.max(), _LAST)
     right = panel.secondary_yaxis("right")
     right.set_yticks(list(magic.values()), [str(n) if numbered and n <= _NUMBERED else "" for n in magic])
@@ -128,7 +111,6 @@ def _theory(panel: Any, found: xr.Dataset, *, numbered: bool) -> None:
 
 def _named(found: xr.Dataset) -> str:
     """Return what one column shows, in two lines."""
-    ground = json.loads(found.attrs["scene"])["ground"]
-    law = style.LAW_NAMES[meanings_of(found.contact)[int(found.contact)]] + style.maker_of(found)
-    damping, friction = number_format.readable(ground["damping"]), number_format.readable(ground["friction"])
-    return f"{found.attrs['model']}, {law}\nD = {damping} kg/s, μ = {friction}"
+    ground = scene_of(found)["ground"]
+    numbers = ground_words(damping=ground["damping"], friction=ground["friction"])
+    return f"{found.attrs['model']}, {style.law_of(found)}\n{numbers}"

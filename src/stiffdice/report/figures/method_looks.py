@@ -1,4 +1,4 @@
-"""How a method looks, the same in every figure: schemes full lines, outside peers dashed."""
+"""How a method looks, the same in every figure: our schemes full lines, engines and solvers dashed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 from matplotlib.lines import Line2D
 
 from stiffdice.report.figures import style
+from stiffdice.report.methods import name_of
 from stiffdice.simulation.engines.registry import PEERS
 
 _LOOKS: dict[str, dict[str, Any]] = {
@@ -31,19 +32,11 @@ _LOOKS: dict[str, dict[str, Any]] = {
 
 def look(method: str) -> dict[str, Any]:
     """Return colour, mark and line of a method."""
-    line = {
-        "linestyle": "--" if method in PEERS else "-",
-        "linewidth": 1.0,
-        "markersize": 6 if method == "exact" else 4,
-    }
+    dashes = "--" if method in PEERS else "-"
+    line = {"linestyle": dashes, "linewidth": 1.0, "markersize": 6 if method == "exact" else 4}
     return _LOOKS.get(method, {"color": style.QUIET, "marker": "."}) | line
-
-
-def name_of(method: str) -> str:
-    """Return a method's name in a legend."""
-    return PEERS[method].name if method in PEERS else method.replace("_", " ")
 
 
 def handles(methods: list[str]) -> list[Line2D]:
     """Return a legend's lines."""
-    return [Line2D([], [], label=name_of(method), **look(method)) for method in methods]
+    return [style.line(name_of(method), **look(method)) for method in methods]
