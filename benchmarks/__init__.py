@@ -9,8 +9,7 @@ from __future__ import annotations
 BENCHMARKS: dict[str, str] = {
     "roof": "benchmarks.roof",
     "listing": "benchmarks.listing",
-    "swift": "benchmarks.swift",
-    "lanes": "benchmarks.lanes",
+    "ensemble": "benchmarks.ensemble",
     "octave": "benchmarks.octave",
     "engines": "benchmarks.engines",
     "skipping": "benchmarks.skipping",

@@ -54,24 +54,33 @@ class Reached(NamedTuple):
 
 
 RATIOS = (
-    Aim("throw, ungated: Octave node by node over the fast kernel", "octave_listing", "swift_tumbling_ungated", 1e5),
     Aim(
-        "throw, gated: Octave node by node (ungated) over the fast kernel",
+        "throw, ungated: Octave node by node over the loop of sweeps",
         "octave_listing",
-        "swift_tumbling_gated",
+        "ensemble_tumbling_ungated",
         1e5,
     ),
-    Aim("throw, gated: MuJoCo over the fast kernel", "mujoco_tumbling_gated", "swift_tumbling_gated", 250),
-    Aim("vertical, gated: MuJoCo over the fast kernel", "mujoco_vertical_gated", "swift_vertical_gated", 2000),
-    Aim("throw, gated: listings' order over the fast kernel", "listing_tumbling_gated", "swift_tumbling_gated"),
-    Aim("throw, ungated: listings' order over the fast kernel", "listing_tumbling_ungated", "swift_tumbling_ungated"),
-    Aim("ensemble, vertical, gated: share of the FMA peak", "fma_peak", "lanes_vertical_gated", 0.4, share=True),
-    Aim("ensemble, tumbling, gated: share of the FMA peak", "fma_peak", "lanes_tumbling_gated", share=True),
-    Aim("ensemble, vertical, ungated: share of the FMA peak", "fma_peak", "lanes_vertical_ungated", share=True),
-    Aim("ensemble, tumbling, ungated: share of the FMA peak", "fma_peak", "lanes_tumbling_ungated", share=True),
-    Aim("throw, ungated: Octave node by node over the ensemble", "octave_listing", "lanes_tumbling_ungated", 1e5),
-    Aim("ensemble, vertical: one thread over two", "lanes_vertical_gated", "lanes_vertical_gated_2_threads"),
-    Aim("ensemble, tumbling: one thread over two", "lanes_tumbling_gated", "lanes_tumbling_gated_2_threads"),
+    Aim(
+        "throw, gated: MuJoCo's rollout over the loop of sweeps",
+        "mujoco_rollout_tumbling_gated",
+        "ensemble_tumbling_gated",
+        250,
+    ),
+    Aim(
+        "vertical, gated: MuJoCo's rollout over the loop of sweeps",
+        "mujoco_rollout_vertical_gated",
+        "ensemble_vertical_gated",
+        2000,
+    ),
+    Aim("throw, gated: listings' order over the loop of sweeps", "listing_tumbling_gated", "ensemble_tumbling_gated"),
+    Aim(
+        "throw, ungated: listings' order over the loop of sweeps",
+        "listing_tumbling_ungated",
+        "ensemble_tumbling_ungated",
+    ),
+    Aim("sliding, ungated: share of the FMA peak", "fma_peak", "ensemble_sliding_ungated", share=True),
+    Aim("tumbling, ungated: share of the FMA peak", "fma_peak", "ensemble_tumbling_ungated", share=True),
+    Aim("tumbling, gated: share of the FMA peak", "fma_peak", "ensemble_tumbling_gated", share=True),
     Aim("gated sweep at S = 10⁸, vertical: stepped over skipping", "sweep_vertical_stepped", "sweep_vertical", 100),
     Aim("gated sweep at S = 10⁸, tumbling: stepped over skipping", "sweep_tumbling_stepped", "sweep_tumbling", 20),
 )

@@ -46,7 +46,7 @@ class Case(NamedTuple):
     prepare: Callable[[], Callable[[], object]]
     times: int
     holds: str
-    flops: int = 0
+    flops: float = 0
     chain: Sequence[str] = ()
     fresh: bool = False
     version: str = ""

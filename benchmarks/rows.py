@@ -68,7 +68,7 @@ def _row(bench: xr.Dataset, name: str) -> Row:
     seconds, values = seconds_of(bench, name), samples_of(bench, name)
     cycle, peak = best_of(bench, "cycle"), best_of(bench, "fma_peak")
     chain = str(attributes.get("chain", "")).split()
-    flops = int(attributes.get("floating_point_operations", 0))
+    flops = float(attributes.get("floating_point_operations", 0))
     waiting = sum(best_of(bench, f"latency_{link}") for link in chain) if chain else math.nan
     working = flops * peak if flops else math.nan
     bound, by = (waiting, "waiting") if chain else (working, "peak")

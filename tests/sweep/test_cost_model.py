@@ -169,7 +169,10 @@ def test_numbers_that_cannot_be_imported_without_compiling_are_those_of_the_simu
     assert cost_model.SAMPLES == reference.SAMPLES
     assert cost_model.FEWEST_BETWEEN == fast_forward.WORTHWHILE
     assert cost_model.FEWEST == batch_loop.FEWEST and batch_loop.SCHEME == cost_model.PAPERS
-    assert all(batched_kernel.WIDTHS[model] == many.width for model, many in cost_model.LANES.items())
+    assert all(
+        batched_kernel.WIDTHS[type(batched_kernel.ABREAST[model])] == many.width
+        for model, many in cost_model.LANES.items()
+    )
 
 
 @pytest.mark.parametrize(

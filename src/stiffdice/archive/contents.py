@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from stiffdice.archive import manifest
+from stiffdice.archive import extract, manifest
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.reader import open_file
@@ -43,9 +42,6 @@ _TREES = {"requirements": "lock", "src": "code", "workflow": "code"}
 # What a job in progress, an interrupted one, a damaged result or Python leaves behind, and archives themselves.
 _LEFT_OUT = (".part", ".damaged", ".pyc", ".zip", ".egg-info")
 
-# The same on every system; no system takes one for another, or for a path.
-_NAME = re.compile(r"[A-Za-z0-9_+-]([A-Za-z0-9 _+.-]*[A-Za-z0-9_+-])?")
-
 
 class File(NamedTuple):
     """A file to be packed: its path in the archive, its kind, where it lies now, and the result that it is part of."""
@@ -68,16 +64,9 @@ def of(study: Study, root: Path) -> list[File]:
 
     root: the project's folder. Raises InputError naming the first file that is missing, stale or cannot be packed.
     """
-    files = [*_project(root), *_config(study.name, root), *_results(study, root)]
-    by_path: dict[str, File] = {}
-    for file in files:
-        for part in file.path.split("/"):
-            if not _NAME.fullmatch(part):
-                raise InputError(f"{file.path}: allowed in names in an archive are letters, digits and _ + - . between")
-        other = by_path.setdefault(file.path.lower(), file)
-        if other.path != file.path:
-            raise InputError(f"{file.path}: some systems take it for {other.path}; an archive cannot hold both")
-    return sorted(by_path.values())
+    files = {file.path: file for file in (*_project(root), *_config(study.name, root), *_results(study, root))}
+    extract.check_names([*files])
+    return [files[path] for path in sorted(files)]
 
 
 def scenes_of(study: str, root: Path) -> list[str]:

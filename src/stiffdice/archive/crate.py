@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from mimetypes import MimeTypes
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 from urllib.parse import quote
@@ -42,17 +43,11 @@ _OF_PARTS = {
 _TERMS = {"sha256": "http://schema.org/sha256"}
 _NETCDF = "https://docs.unidata.ucar.edu/netcdf-c/current/file_format_specifications.html"
 
+# Besides those that Python knows.
 _FORMATS = {
     ".cff": "application/yaml",
-    ".csv": "text/csv",
-    ".gif": "image/gif",
-    ".h5": "application/x-hdf5",
-    ".html": "text/html",
     ".md": "text/markdown",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
     ".toml": "application/toml",
-    ".txt": "text/plain",
     ".yaml": "application/yaml",
 }
 _FOLDERS = {
@@ -212,7 +207,7 @@ class _Crate:
         """Return size, digest and format of a file."""
         size, sha256 = self.facts.digests[path]
         suffix = PurePosixPath(path).suffix
-        media = _FORMATS.get(suffix, "text/plain")
+        media = _FORMATS.get(suffix) or MimeTypes().types_map[True].get(suffix, "text/plain")
         told: dict[str, Any] = {"name": PurePosixPath(path).name, "contentSize": str(size), "sha256": sha256}
         return told | {"encodingFormat": [media, {"@id": _NETCDF}] if suffix == ".h5" else media}
 

@@ -78,19 +78,32 @@ def _check(members: Sequence[ZipInfo]) -> None:
             raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
     if sum(member.file_size for member in members) > MOST_BYTES:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
-    _check_doubles(members)
+    check_names([member.filename for member in members])
     _check_overlaps(members)
 
 
-def _is_folder(member: ZipInfo) -> bool:
-    return member.filename.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
-
-
 def _wrong(member: ZipInfo) -> str | None:
-    """Return why a member must not be unpacked: its name leads elsewhere, here or on another system, or what it is."""
-    name, method, size, packed = member.orig_filename, member.compress_type, member.file_size, member.compress_size
-    parts = name.removesuffix("/").split("/")
+    """Return why a member must not be unpacked."""
+    method, size, packed = member.compress_type, member.file_size, member.compress_size
     kind = stat.S_IFMT(member.external_attr >> 16)
+    reasons = {
+        "has a second name": member.filename != member.orig_filename,  # some versions of zipfile take it instead
+        "is a link or a special file; allowed are files and folders": kind
+        not in {0, stat.S_IFDIR if _is_folder(member.filename) else stat.S_IFREG},
+        "is encrypted": member.flag_bits & _ENCRYPTED,
+        f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
+        f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
+    }
+    return _wrong_name(member.orig_filename) or next((reason for reason, holds in reasons.items() if holds), None)
+
+
+def _is_folder(name: str) -> bool:
+    return name.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
+
+
+def _wrong_name(name: str) -> str | None:
+    """Return why a name must not be in an archive: it leads elsewhere, here or on another system."""
+    parts = name.removesuffix("/").split("/")
     reasons = {
         "a name with a character that is not printed": not name.isprintable(),  # also NUL, and what turns text around
         "an absolute path": name.startswith("/"),
@@ -100,36 +113,35 @@ def _wrong(member: ZipInfo) -> str | None:
         "a path with an empty part": "" in parts,
         "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
         f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
-        "has a second name": member.filename != name,  # some versions of zipfile take it instead
-        "is a link or a special file; allowed are files and folders": kind
-        not in {0, stat.S_IFDIR if _is_folder(member) else stat.S_IFREG},
-        "is encrypted": member.flag_bits & _ENCRYPTED,
-        f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
-        f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
     }
     return next((reason for reason, holds in reasons.items() if holds), None)
 
 
-def _check_doubles(members: Sequence[ZipInfo]) -> None:
-    """Raise RefusedError if two names are one file somewhere: in any case, in any form of Unicode, or as a folder."""
+def check_names(names: Sequence[str]) -> None:
+    """Raise RefusedError for a name that leads elsewhere, and for two that are one file somewhere.
+
+    That is in any case, in any form of Unicode, or as a file and a folder.
+    """
     folders: set[str] = set()
     files: set[str] = set()
     spelt: dict[str, str] = {}  # each path of a file or folder, as a file system may know it and as it is said
-    for member in members:
-        *above, last = member.filename.removesuffix("/").split("/")
+    for name in names:
+        if reason := _wrong_name(name):
+            raise RefusedError(f"{name[:200]}: {reason}")
+        *above, last = name.removesuffix("/").split("/")
         path = ""
-        for part in [*above, last] if _is_folder(member) else above:
+        for part in [*above, last] if _is_folder(name) else above:
             path += f"{part}/"
             if path not in folders:
                 folders.add(path)
                 _take(path, spelt)
         if len(folders) > MOST_FOLDERS:
             raise RefusedError(f"more than {MOST_FOLDERS} folders; this is no archive of a study")
-        if not _is_folder(member):
-            if member.filename in files:
-                raise RefusedError(f"{member.filename}: is there twice")
-            files.add(member.filename)
-            _take(member.filename, spelt)
+        if not _is_folder(name):
+            if name in files:
+                raise RefusedError(f"{name}: is there twice")
+            files.add(name)
+            _take(name, spelt)
 
 
 def _take(path: str, spelt: dict[str, str]) -> None:
@@ -180,7 +192,7 @@ def _unpack_all(archive: ZipFile, folder: Path, tell: Callable[[float], None], d
 
 def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
     """Unpack one member; raises one of _DAMAGED, and leaves no file, if its content is damaged."""
-    if _is_folder(member):
+    if _is_folder(member.filename):
         path.mkdir(parents=True, exist_ok=True)
         return
     path.parent.mkdir(parents=True, exist_ok=True)

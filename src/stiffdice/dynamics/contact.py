@@ -70,12 +70,6 @@ def reaches(law: Any, clearance: float) -> bool:
 
 
 @njit
-def acts(law: Any, touching: Any, speed: float) -> bool:
-    """Return whether the law can act on a body; speed [m/s]: at least so fast every node leaves the ground."""
-    return touching or (drags(law) and speed < 0.0)
-
-
-@njit
 def normal_force(law: Any, depth: float, speed: float, stiffness: float, damping: float) -> float:
     """Return the magnitude of the normal force on one node [N]; speed [m/s]: along the outward normal."""
     return push(law, depth, damping * speed, stiffness)

@@ -5,7 +5,7 @@ processor has in width, so that nothing hangs on whether a loop was found fit to
 does not depend on its place among the others. Nothing is fused or rearranged: numbers are the same on every processor,
 and infinities and not-a-number behave as ever.
 
-In compiled code only: `load`, `store`, `of_three`, `lane`, `total`, `where`, `bits`; `+ − * /`, comparisons,
+In compiled code only: `load`, `store`, `where`, `bits`; `+ − * /`, comparisons,
 `& | ^ ~`, `abs`, `max`, `math.sqrt`. A comparison gives a mask.
 """
 
@@ -129,7 +129,7 @@ _define(math.sqrt, 1, _call("sqrt"))
 _define(max, 2, _max)
 for _compare, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
     _define(_compare, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b), Mask)
-_define(operator.ne, 2, lambda builder, a, b: builder.fcmp_unordered("!=", a, b), Mask)
+_define(operator.eq, 2, lambda builder, a, b: builder.fcmp_ordered("==", a, b), Mask)
 _define(operator.and_, 2, lambda builder, a, b: builder.and_(a, b), Mask, Mask)
 _define(operator.or_, 2, lambda builder, a, b: builder.or_(a, b), Mask, Mask)
 _define(operator.xor, 2, lambda builder, a, b: builder.xor(a, b), Mask, Mask)
@@ -169,48 +169,6 @@ def store(typing: Any, array: Any, row: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(array, row, value), build
-
-
-@intrinsic
-def of_three(typing: Any, a: Any, b: Any, c: Any) -> Any:
-    """Return three numbers as four lanes, the last of them zero."""
-    result = Lanes(4)
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = ir.Constant(ir.VectorType(_DOUBLE, 4), [0.0] * 4)
-        for k, value in enumerate(args):
-            vector = builder.insert_element(vector, value, ir.IntType(32)(k))
-        return vector
-
-    return result(types.float64, types.float64, types.float64), build
-
-
-@intrinsic(prefer_literal=True)
-def lane(typing: Any, value: Any, index: Any) -> Any:
-    """Return the number in one lane."""
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.extract_element(args[0], ir.IntType(32)(index.literal_value))
-
-    return types.float64(value, index), build
-
-
-@intrinsic
-def total(typing: Any, value: Any) -> Any:
-    """Return the sum of all lanes, a power of two of them: the first half plus the second, and so on."""
-
-    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        (vector,), width = args, value.width
-        while width > 1:
-            width //= 2
-            halves = [
-                builder.shuffle_vector(vector, vector, ir.Constant(ir.VectorType(ir.IntType(32), width), part))
-                for part in (list(range(width)), list(range(width, 2 * width)))
-            ]
-            vector = builder.fadd(*halves)
-        return builder.extract_element(vector, ir.IntType(32)(0))
-
-    return types.float64(value), build
 
 
 @intrinsic

@@ -1,54 +1,34 @@
-"""The ensemble kernel: many members at once by the paper's scheme, a vector register holding a number of several.
+"""The fast kernel of the paper's scheme: members side by side, a vector register holding a number of several.
 
 The motion is written in the ground's axes, the third along its normal. A cube is three half-edges a, b, c, and its
 nodes are at ±a±b±c: their heights, their velocities u + ω × r and the torque of their forces follow from sums and
 differences, two by two. The rotation of a step (equation 9) is E + s A + v A², A the matrix of the angle turned, and s
 and v are polynomials in its square. So a step branches nowhere and calls nothing that a vector unit cannot do; a member
-that turns by more than a radian in a step is turned by itself.
+that turns by more than a radian in a step is turned by itself. A member's numbers are the same to the last bit whoever
+is beside it.
 
-What comes out agrees with `fixed_step.py` to round-off, not to the last bit: sums are made in another order.
+They agree with the listings' order (`symplectic_euler.py`) to round-off, not to the last bit: sums are in another
+order.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import LAWS, push
-from stiffdice.dynamics.models.registry import MODELS
+from stiffdice.dynamics.contact import push
+from stiffdice.dynamics.models.registry import turns
 from stiffdice.dynamics.models.sliding import Sliding
 from stiffdice.dynamics.models.tumbling import Tumbling
 from stiffdice.dynamics.models.vertical import Vertical
 from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.simd import bits, load, store, where
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States
-from stiffdice.errors import InputError
-from stiffdice.scene import validation
+from stiffdice.dynamics.simd import load, store, where
+from stiffdice.dynamics.state import TURNING, Array, States
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
-
-# Members side by side: enough for the vector units to have always something to do that does not wait for the step
-# before, and not more than registers and the stores behind them hold.
-WIDTHS = {"vertical": 64, "sliding": 32, "tumbling": 16}
-_VERTICAL, _SLIDING, _TUMBLING = WIDTHS.values()
-
-# Floating-point operations of one step of one member by model and contact law, a flat cube where the model does not
-# turn it: each sum, difference, product, quotient, square root and maximum is one, and so two where they are fused;
-# signs, comparisons, choices and moves are none (what Intel's counters FP_ARITH_INST_RETIRED count). They are those of
-# the compiled loop, counted in it by its test; nothing is skipped, so that every step has as many.
-FLOPS = {
-    ("vertical", "ungated"): 17,
-    ("vertical", "gated"): 13,
-    ("sliding", "ungated"): 36,
-    ("sliding", "gated"): 32,
-    ("tumbling", "ungated"): 421,
-    ("tumbling", "gated"): 405,
-}
 
 
 class Vector(NamedTuple):
@@ -59,24 +39,8 @@ class Vector(NamedTuple):
     z: Any
 
 
-class Rising(NamedTuple):
-    """The state of `vertical`; levels [m]: of the half-edges."""
-
-    height: Any
-    speed: Any
-    levels: Vector
-
-
-class Moving(NamedTuple):
-    """The state of `sliding`; levels [m]: of the half-edges."""
-
-    place: Vector
-    velocity: Vector
-    levels: Vector
-
-
-class Turning(NamedTuple):
-    """The state of `tumbling`; spin [rad/s]: as the nodes' velocities use it; a, b, c [m]: the half-edges."""
+class Body(NamedTuple):
+    """The state; spin [rad/s]: as the nodes' velocities use it; a, b, c [m]: the half-edges."""
 
     place: Vector
     velocity: Vector
@@ -98,6 +62,25 @@ class Numbers(NamedTuple):
     per_mass: float
     per_inertia: float
     gain: Vector
+
+
+class Alone(NamedTuple):
+    """The tag of blocks of one member."""
+
+
+class Sixteen(NamedTuple):
+    """The tag of blocks of 16 members."""
+
+
+class ThirtyTwo(NamedTuple):
+    """The tag of blocks of 32 members."""
+
+
+WIDTHS: dict[type, int] = {Alone: 1, Sixteen: 16, ThirtyTwo: 32}
+
+# Members side by side: enough for the vector units to have always something to do that does not wait for the step
+# before, and not more than registers and the stores behind them hold.
+ABREAST: dict[str, Any] = {"vertical": ThirtyTwo(), "sliding": ThirtyTwo(), "tumbling": Sixteen()}
 
 
 class Flat(NamedTuple):
@@ -152,30 +135,30 @@ def _along(start: Vector, factor: Any, a: Vector) -> Vector:
 
 
 @inlined
-def _flat_push(law: Any, k: Numbers, height: Any, speed: Any, levels: Vector) -> Any:
-    half = max(abs(levels.x), abs(levels.y))
-    half = max(half, abs(levels.z))
-    stiffness, drag = 4.0 * k.stiffness, (4.0 * k.damping) * speed  # of the four nodes of a face
+def _flat_push(law: Any, k: Numbers, body: Body) -> Any:
+    half = max(abs(body.a.z), abs(body.b.z))
+    half, height = max(half, abs(body.c.z)), body.place.z
+    stiffness, drag = 4.0 * k.stiffness, (4.0 * k.damping) * body.velocity.z  # of the four nodes of a face
     return push(law, half - height, drag, stiffness) + push(law, -half - height, drag, stiffness)
 
 
 @inlined
-def _edge_push(law: Any, k: Numbers, height: Any, drag: Any, level: Any, c: Any) -> Any:
-    return push(law, (level - c) - height, drag, k.stiffness) + push(law, (level + c) - height, drag, k.stiffness)
+def _edge_push(law: Any, k: Numbers, height: Any, drag: Any, c: Any) -> Any:
+    return push(law, -c - height, drag, k.stiffness) + push(law, c - height, drag, k.stiffness)
 
 
 @inlined
-def _face_push(law: Any, k: Numbers, height: Any, drag: Any, level: Any, b: Any, c: Any) -> Any:
-    return _edge_push(law, k, height, drag, level - b, c) + _edge_push(law, k, height, drag, level + b, c)
+def _face_push(law: Any, k: Numbers, height: Any, drag: Any, b: Any, c: Any) -> Any:
+    return _edge_push(law, k, height + b, drag, c) + _edge_push(law, k, height - b, drag, c)
 
 
 @inlined
-def _tilted_push(law: Any, k: Numbers, height: Any, speed: Any, levels: Vector) -> Any:
-    drag, a, b, c = k.damping * speed, levels.x, levels.y, levels.z
-    return _face_push(law, k, height, drag, -a, b, c) + _face_push(law, k, height, drag, a, b, c)
+def _tilted_push(law: Any, k: Numbers, body: Body) -> Any:
+    height, drag, a, b, c = body.place.z, k.damping * body.velocity.z, body.a.z, body.b.z, body.c.z
+    return _face_push(law, k, height + a, drag, b, c) + _face_push(law, k, height - a, drag, b, c)
 
 
-# (posture, law, k, height, speed, levels) -> the normal force on all nodes of a cube that does not turn [N].
+# (posture, law, k, body) -> the normal force on all nodes of a cube that does not turn [N].
 _whole_push = by_tag({Flat: _flat_push, Tilted: _tilted_push}, inlined=True)
 
 
@@ -186,10 +169,8 @@ def _grip(k: Numbers, push: Any, velocity: Vector) -> Any:
 
 
 @inlined
-def _rise(posture: Any, law: Any, k: Numbers, body: Rising) -> Rising:
-    push = _whole_push(posture, law, k, body.height, body.speed, body.levels)
-    speed = body.speed + (k.per_mass * push + k.gain.z)
-    return Rising(body.height + k.h * speed, speed, body.levels)
+def _moved(k: Numbers, body: Body, velocity: Vector) -> Body:
+    return Body(_along(body.place, k.h, velocity), velocity, *body[2:])
 
 
 @inlined
@@ -198,11 +179,16 @@ def _kicked(k: Numbers, velocity: Vector, force: Vector) -> Vector:
 
 
 @inlined
-def _slide(posture: Any, law: Any, k: Numbers, body: Moving) -> Moving:
-    push = _whole_push(posture, law, k, body.place.z, body.velocity.z, body.levels)
+def _rise(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
+    u = body.velocity
+    return _moved(k, body, Vector(u.x, u.y, u.z + (k.per_mass * _whole_push(posture, law, k, body) + k.gain.z)))
+
+
+@inlined
+def _slide(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
+    push = _whole_push(posture, law, k, body)
     grip = _grip(k, push, body.velocity)
-    velocity = _kicked(k, body.velocity, Vector(grip * body.velocity.x, grip * body.velocity.y, push))
-    return Moving(_along(body.place, k.h, velocity), velocity, body.levels)
+    return _moved(k, body, _kicked(k, body.velocity, Vector(grip * body.velocity.x, grip * body.velocity.y, push)))
 
 
 @inlined
@@ -232,7 +218,7 @@ def _four(
 
 
 @inlined
-def _forces(law: Any, k: Numbers, body: Turning) -> tuple[Vector, Vector]:
+def _forces(law: Any, k: Numbers, body: Body) -> tuple[Vector, Vector]:
     """Return the force on all nodes [N], without their weight, and its torque [N m]: Σ r × f = a × Σ ±f + …"""
     by_a, by_b, by_c = _cross(body.spin, body.a), _cross(body.spin, body.b), _cross(body.spin, body.c)
     height, u = body.place.z, body.velocity
@@ -258,7 +244,7 @@ def _rotation(q: Any) -> tuple[Any, Any]:
 
 
 @inlined
-def _turned(body: Turning, angle: Vector, sine: Any, versine: Any) -> tuple[Vector, Vector, Vector]:
+def _turned(body: Body, angle: Vector, sine: Any, versine: Any) -> tuple[Vector, Vector, Vector]:
     """Return the half-edges after a rotation by E + sine A + versine A²: what it adds is small, and so is its error."""
     s, v = _times(sine, angle), _times(versine, angle)
     xx, yy, zz = v.x * angle.x, v.y * angle.y, v.z * angle.z
@@ -282,7 +268,7 @@ def _beyond(angle: Vector) -> Any:
 
 
 @inlined
-def _tumble(posture: Any, law: Any, k: Numbers, body: Turning) -> Turning:
+def _tumble(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
     force, torque = _forces(law, k, body)
     velocity = _kicked(k, body.velocity, force)
     momentum = _along(body.momentum, k.h, torque)
@@ -291,25 +277,22 @@ def _tumble(posture: Any, law: Any, k: Numbers, body: Turning) -> Turning:
     sine, versine = _rotation(dot(angle, angle))
     beyond = _beyond(angle)
     edges = _turned(body, angle, where(beyond, 0.0, sine), where(beyond, 0.0, versine))
-    return Turning(_along(body.place, k.h, velocity), velocity, momentum, spin, *edges)
+    return Body(_along(body.place, k.h, velocity), velocity, momentum, spin, *edges)
 
 
-# (model, posture, law, k, body) -> the state one step later, but for the turn of members of which `unturned` tells.
+# (model, posture, law, k, body) -> the state one step later, but for the turn of members that are `unturned`.
 step = by_tag({Vertical: _rise, Sliding: _slide, Tumbling: _tumble}, inlined=True)
 
 
 @inlined
-def _none_unturned(k: Numbers, body: Any) -> int:
-    return 0
+def unturned(k: Numbers, body: Body) -> Any:
+    """Return the mask of members that the last step has not turned, as they turn by more than a radian."""
+    return _beyond(_times(k.h, body.spin))
 
 
-@inlined
-def _unturned(k: Numbers, body: Turning) -> int:
-    return bits(_beyond(_times(k.h, body.spin)))
-
-
-# (model, k, body) -> which members the last step has not turned, as they turn by more than a radian; lane j is bit j.
-unturned = by_tag({Vertical: _none_unturned, Sliding: _none_unturned, Tumbling: _unturned}, inlined=True)
+@njit
+def _put(block: Array, row: int, lane: int, v: Vector) -> None:
+    block[row, lane], block[row + 1, lane], block[row + 2, lane] = v.x, v.y, v.z
 
 
 @njit
@@ -323,32 +306,24 @@ def turn(block: Array, lane: int, h: float) -> None:
     for edge in range(EDGES, ROWS, 3):
         now = Vector(block[edge, lane], block[edge + 1, lane], block[edge + 2, lane])
         across = _cross(angle, now)
-        new = _along(_along(now, sine, across), versine, _cross(angle, across))
-        block[edge, lane], block[edge + 1, lane], block[edge + 2, lane] = new
+        _put(block, edge, lane, _along(_along(now, sine, across), versine, _cross(angle, across)))
+
+
+def _row_of(width: int) -> Any:
+    @inlined
+    def row_of(block: Array, row: int) -> Any:
+        return load(block, row, width)
+
+    return row_of
+
+
+# (width, block, row) -> a row of a block.
+row_of = by_tag({width: _row_of(count) for width, count in WIDTHS.items()}, inlined=True)
 
 
 @inlined
-def _vertical_row(block: Array, row: int) -> Any:
-    return load(block, row, _VERTICAL)
-
-
-@inlined
-def _sliding_row(block: Array, row: int) -> Any:
-    return load(block, row, _SLIDING)
-
-
-@inlined
-def _tumbling_row(block: Array, row: int) -> Any:
-    return load(block, row, _TUMBLING)
-
-
-# (model, block, row) -> a row of a block, as wide as the model has it.
-row_of = by_tag({Vertical: _vertical_row, Sliding: _sliding_row, Tumbling: _tumbling_row}, inlined=True)
-
-
-@inlined
-def _load(model: Any, block: Array, row: int) -> Vector:
-    return Vector(row_of(model, block, row), row_of(model, block, row + 1), row_of(model, block, row + 2))
+def _load(width: Any, block: Array, row: int) -> Vector:
+    return Vector(row_of(width, block, row), row_of(width, block, row + 1), row_of(width, block, row + 2))
 
 
 @inlined
@@ -359,54 +334,22 @@ def _store(block: Array, row: int, value: Vector) -> None:
 
 
 @inlined
-def _levels(model: Any, block: Array) -> Vector:
-    return Vector(row_of(model, block, EDGES + 2), row_of(model, block, EDGES + 5), row_of(model, block, EDGES + 8))
-
-
-@inlined
-def _read_rising(block: Array) -> Rising:
-    model = Vertical()
-    return Rising(row_of(model, block, PLACE + 2), row_of(model, block, VELOCITY + 2), _levels(model, block))
-
-
-@inlined
-def _read_moving(block: Array) -> Moving:
-    model = Sliding()
-    return Moving(_load(model, block, PLACE), _load(model, block, VELOCITY), _levels(model, block))
-
-
-@inlined
-def _read_turning(block: Array) -> Turning:
-    model = Tumbling()
-    return Turning(
-        _load(model, block, PLACE),
-        _load(model, block, VELOCITY),
-        _load(model, block, MOMENTUM),
-        _load(model, block, SPIN),
-        _load(model, block, EDGES),
-        _load(model, block, EDGES + 3),
-        _load(model, block, EDGES + 6),
+def read(width: Any, block: Array) -> Body:
+    """Return the state of a block's members."""
+    return Body(
+        _load(width, block, PLACE),
+        _load(width, block, VELOCITY),
+        _load(width, block, MOMENTUM),
+        _load(width, block, SPIN),
+        _load(width, block, EDGES),
+        _load(width, block, EDGES + 3),
+        _load(width, block, EDGES + 6),
     )
 
 
-# (model, block) -> the state of a block's members.
-read = by_tag({Vertical: _read_rising, Sliding: _read_moving, Tumbling: _read_turning}, inlined=True)
-
-
 @inlined
-def _write_rising(block: Array, body: Rising) -> None:
-    store(block, PLACE + 2, body.height)
-    store(block, VELOCITY + 2, body.speed)
-
-
-@inlined
-def _write_moving(block: Array, body: Moving) -> None:
-    _store(block, PLACE, body.place)
-    _store(block, VELOCITY, body.velocity)
-
-
-@inlined
-def _write_turning(block: Array, body: Turning) -> None:
+def write(block: Array, body: Body) -> None:
+    """Put the state of a block's members back."""
     _store(block, PLACE, body.place)
     _store(block, VELOCITY, body.velocity)
     _store(block, MOMENTUM, body.momentum)
@@ -416,33 +359,37 @@ def _write_turning(block: Array, body: Turning) -> None:
     _store(block, EDGES + 6, body.c)
 
 
-# (model, block, body): put the state of a block's members back.
-write = by_tag({Vertical: _write_rising, Sliding: _write_moving, Tumbling: _write_turning}, inlined=True)
+@njit
+def _to_ground(axes: Array, v: Any) -> Vector:
+    # Where the ground is level nothing changes, and no infinity becomes not-a-number.
+    if axes[2, 2] == 1.0:
+        return Vector(v[0], v[1], v[2])
+    return Vector(
+        axes[0, 0] * v[0] + axes[0, 1] * v[1] + axes[0, 2] * v[2],
+        axes[1, 0] * v[0] + axes[1, 1] * v[1] + axes[1, 2] * v[2],
+        axes[2, 0] * v[0] + axes[2, 1] * v[1] + axes[2, 2] * v[2],
+    )
 
 
 @njit
-def _to_ground(axes: Array, vector: Any, block: Array, row: int, lane: int) -> None:
-    for k in range(3):
-        along = axes[k, 0] * vector[0] + axes[k, 1] * vector[1] + axes[k, 2] * vector[2]
-        # Where the ground is level nothing changes, and no infinity becomes not-a-number.
-        block[row + k, lane] = vector[k] if axes[2, 2] == 1.0 else along
-
-
-@njit
-def _to_world(axes: Array, block: Array, row: int, lane: int, vector: Any) -> None:
-    x, y, z = block[row, lane], block[row + 1, lane], block[row + 2, lane]
-    for k in range(3):
-        along = axes[0, k] * x + axes[1, k] * y + axes[2, k] * z
-        vector[k] = block[row + k, lane] if axes[2, 2] == 1.0 else along
+def _to_world(axes: Array, block: Array, row: int, lane: int) -> Vector:
+    v = Vector(block[row, lane], block[row + 1, lane], block[row + 2, lane])
+    if axes[2, 2] == 1.0:
+        return v
+    return Vector(
+        axes[0, 0] * v.x + axes[1, 0] * v.y + axes[2, 0] * v.z,
+        axes[0, 1] * v.x + axes[1, 1] * v.y + axes[2, 1] * v.z,
+        axes[0, 2] * v.x + axes[1, 2] * v.y + axes[2, 2] * v.z,
+    )
 
 
 @njit
 def enter(axes: Array, state: Any, block: Array, lane: int) -> None:
     """Put a STATE record into a lane of a block; axes: the ground's, shape (axis, 3)."""
-    _to_ground(axes, state.position, block, PLACE, lane)
-    _to_ground(axes, state.velocity, block, VELOCITY, lane)
-    _to_ground(axes, state.angular_momentum, block, MOMENTUM, lane)
-    _to_ground(axes, state.angular_velocity, block, SPIN, lane)
+    _put(block, PLACE, lane, _to_ground(axes, state.position))
+    _put(block, VELOCITY, lane, _to_ground(axes, state.velocity))
+    _put(block, MOMENTUM, lane, _to_ground(axes, state.angular_momentum))
+    _put(block, SPIN, lane, _to_ground(axes, state.angular_velocity))
     nodes = state.node_offset
     for edge in range(3):
         x = y = z = 0.0
@@ -450,61 +397,32 @@ def enter(axes: Array, state: Any, block: Array, lane: int) -> None:
             x += SIGNS[k, edge] * nodes[k, 0]
             y += SIGNS[k, edge] * nodes[k, 1]
             z += SIGNS[k, edge] * nodes[k, 2]
-        _to_ground(axes, (x / 8, y / 8, z / 8), block, EDGES + 3 * edge, lane)
+        _put(block, EDGES + 3 * edge, lane, _to_ground(axes, (x / 8, y / 8, z / 8)))
 
 
 @njit
-def _leave_rising(axes: Array, block: Array, lane: int, state: Any) -> None:
-    state.position[2], state.velocity[2] = block[PLACE + 2, lane], block[VELOCITY + 2, lane]
+def place_of(axes: Array, block: Array, lane: int) -> Vector:
+    """Return the place of a member in a lane along the world's axes [m]."""
+    return _to_world(axes, block, PLACE, lane)
 
 
 @njit
-def _leave_moving(axes: Array, block: Array, lane: int, state: Any) -> None:
-    _to_world(axes, block, PLACE, lane, state.position)
-    _to_world(axes, block, VELOCITY, lane, state.velocity)
-
-
-@njit
-def _leave_turning(axes: Array, block: Array, lane: int, state: Any) -> None:
-    _leave_moving(axes, block, lane, state)
-    _to_world(axes, block, MOMENTUM, lane, state.angular_momentum)
-    _to_world(axes, block, SPIN, lane, state.angular_velocity)
-    edges = np.empty((3, 3))
-    for edge in range(3):
-        _to_world(axes, block, EDGES + 3 * edge, lane, edges[edge])
+def leave(model: Any, axes: Array, block: Array, lane: int, state: Any) -> None:
+    """Put what a step changes of a member into its STATE record."""
+    state.position[0], state.position[1], state.position[2] = place_of(axes, block, lane)
+    state.velocity[0], state.velocity[1], state.velocity[2] = _to_world(axes, block, VELOCITY, lane)
+    if not turns(model):
+        return
+    momentum, spin = state.angular_momentum, state.angular_velocity
+    momentum[0], momentum[1], momentum[2] = _to_world(axes, block, MOMENTUM, lane)
+    spin[0], spin[1], spin[2] = _to_world(axes, block, SPIN, lane)
+    a = _to_world(axes, block, EDGES, lane)
+    b = _to_world(axes, block, EDGES + 3, lane)
+    c = _to_world(axes, block, EDGES + 6, lane)
     nodes = state.node_offset
     for k in range(nodes.shape[0]):
         for axis in range(3):
-            nodes[k, axis] = SIGNS[k, 0] * edges[0, axis] + SIGNS[k, 1] * edges[1, axis] + SIGNS[k, 2] * edges[2, axis]
-
-
-# (model, axes, block, lane, state): put what a step changes of a member into its STATE record.
-leave = by_tag({Vertical: _leave_rising, Sliding: _leave_moving, Tumbling: _leave_turning}, inlined=True)
-
-
-@njit(cache=True, nogil=True)
-def _advance(
-    model: Any, posture: Any, law: Any, k: Numbers, axes: Array, members: States, width: int, steps: int
-) -> None:
-    """Take so many steps of all members, `width` at a time; the last ones share a block with copies of themselves."""
-    block = np.empty((ROWS, width))
-    for first in range(0, members.shape[0], width):
-        present = min(width, members.shape[0] - first)
-        for lane in range(width):
-            enter(axes, members[first + lane % present], block, lane)
-        body = read(model, block)
-        for _ in range(steps):
-            body = step(model, posture, law, k, body)
-            late = unturned(model, k, body)
-            if late != 0:
-                write(model, block, body)
-                for lane in range(width):
-                    if late >> lane & 1:
-                        turn(block, lane, k.h)
-                body = read(model, block)
-        write(model, block, body)
-        for lane in range(present):
-            leave(model, axes, block, lane, members[first + lane])
+            nodes[k, axis] = SIGNS[k, 0] * a[axis] + SIGNS[k, 1] * b[axis] + SIGNS[k, 2] * c[axis]
 
 
 def axes_of(scene: Scene) -> Array:
@@ -539,30 +457,3 @@ def flat(scene: Scene, launches: States) -> bool:
 def posture_of(scene: Scene, model: str, launches: States) -> Any:
     """Return the tag of how the members stand."""
     return Flat() if model not in TURNING and flat(scene, launches) else Tilted()
-
-
-def prepare(scene: Scene, model: str, launches: States, steps: int, threads: int = 1) -> Callable[[], States]:
-    """Return a function that takes so many steps of all members, from their launches, every time it is called.
-
-    launches: STATE records, shape (member,); the states returned have the same shape. Nothing is watched and nothing
-    skipped. threads: among which the members are spread; that changes no bit. Raises InputError for a model that the
-    ground does not act on, and for counts out of range.
-    """
-    if model not in TOUCHING:
-        raise InputError(f"model = {model}: allowed is {' or '.join(sorted(TOUCHING))}")
-    steps, threads = validation.count("steps", steps), validation.count("threads", threads)
-    k, axes, width = numbers_of(scene, scene.duration / steps), axes_of(scene), WIDTHS[model]
-    tags = MODELS[model], posture_of(scene, model, launches), LAWS[scene.ground.contact]
-    share = -(-len(launches) // threads // width) * width
-
-    def run() -> States:
-        members = launches.copy()
-        parts = [members[first : first + share] for first in range(0, len(members), share)]
-        if len(parts) == 1:
-            _advance(*tags, k, axes, members, width, steps)
-            return members
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(pool.map(lambda part: _advance(*tags, k, axes, part, width, steps), parts))
-        return members
-
-    return run

@@ -1,8 +1,8 @@
 """Time-stepping schemes. A scheme is a module with TAG, LAG, FORMULA and `step`; one line registers it.
 
 One that takes steps of its own has a `part` in place of `step` (`adaptive_steps.py`). One that has a `swing`, for which
-the bounds of `fast_forward.py` are proven, takes many steps of a contact at once. One that has a `stretch` takes steps
-until there is something to see; the others one at a time. One that does not apply to every scene and model also has
+the bounds of `fast_forward.py` are proven, takes many steps of a contact at once.
+One that does not apply to every scene and model also has
 `unfit(scene, model)`, which says why not.
 """
 
@@ -66,36 +66,13 @@ def _whole(module: Any) -> Any:
     return one
 
 
-# By the tag: what takes one step, whole or part by part.
-_ONE = {
-    type(module.TAG): adaptive_steps.resumed(module.part) if hasattr(module, "part") else _whole(module)
-    for module in _MODULES.values()
-}
-
 # (scheme, model, law, physics, state, sight, tolerance) -> steps done, 0 or 1, and force evaluations: advance
 # `state` by one step, or by a part of it (`adaptive_steps.py`).
-one = by_tag(_ONE)
-
-
-def _stretch_of_one(module: Any) -> Any:
-    """Return what stands for the `stretch` of a scheme that has none."""
-    one = _ONE[type(module.TAG)]
-
-    @njit
-    def stretch(
-        model: Any, law: Any, physics: Any, state: Any, sight: Any, high: Any, low: Any, most: Any, tolerance: Any
-    ) -> tuple[int, int, int]:
-        steps, evaluations = one(model, law, physics, state, sight, tolerance)
-        return steps, steps, evaluations
-
-    return stretch
-
-
-# (scheme, model, law, physics, state, sight, high, low, most, tolerance) -> steps, those computed, force evaluations:
-# advance `state` by steps that need not be looked at and one that does, at most `most`, as `swift.py` says. None is
-# taken where the one that does is not over (`adaptive_steps.py`).
-stretch = by_tag(
-    {type(module.TAG): getattr(module, "stretch", None) or _stretch_of_one(module) for module in _MODULES.values()}
+one = by_tag(
+    {
+        type(module.TAG): adaptive_steps.resumed(module.part) if hasattr(module, "part") else _whole(module)
+        for module in _MODULES.values()
+    }
 )
 
 # (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.

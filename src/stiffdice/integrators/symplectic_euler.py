@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators import swift
 
 
 class SymplecticEuler(NamedTuple):
@@ -36,10 +35,6 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     models.kick(model, physics, state, wrench, h)
     models.drift(model, physics, state, h)
     return 1
-
-
-# The same steps, faster, and as many as there is nothing to see in.
-stretch = swift.stretch
 
 
 @njit

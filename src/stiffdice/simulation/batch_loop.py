@@ -1,52 +1,57 @@
-"""Many members at once, each watched: `simulate` uses it where steps have to be taken one by one.
+"""The loop of every run by the paper's scheme whose states are not kept step by step: members side by side.
 
-The members of a block are stepped side by side (`batched_kernel.py`), and what the criteria could care about is looked
-at side by side, too: whether the lowest node is above the ground, and the energy in the air. A member to which
-something happens in a step is shown to `monitor.py` and the criteria as it would be by itself: when it touches down or
-leaves the ground, in the step after, when its energy passes a limit, when a number leaves the range of doubles, when it
-comes to rest. What a flight can skip it skips there. Members need not be at the same step: whoever is done makes room
-for the next.
+The members of a block are stepped together (`batched_kernel.py`), and what the criteria could care about is looked at
+together, too: whether the lowest node is above the ground, and the energy in the air. A member to which something
+happens in a step is shown to `monitor.py` and the criteria: when it touches down or leaves the ground, in the step
+after, when its energy passes a limit, when a number leaves the range of doubles, when it comes to rest, and at each
+step that is compared with a reference. What `fast_forward.py` can take at once it takes there. Members need not be at
+the same step: whoever is done makes room for the next.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.compilation import by_tag, njit
-from stiffdice.dynamics.contact import LAWS, swing_square
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
-from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.models.sliding import Sliding
-from stiffdice.dynamics.models.tumbling import Tumbling
 from stiffdice.dynamics.simd import bits, store, where
-from stiffdice.dynamics.state import Array, Physics, States
+from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
 from stiffdice.integrators import batched_kernel
 from stiffdice.integrators import registry as schemes
-from stiffdice.integrators.batched_kernel import Moving, Numbers, Turning, Vector, dot, inlined, row_of
-from stiffdice.scene.scene import Scene
+from stiffdice.integrators.batched_kernel import Alone, Body, Numbers, Vector, dot, inlined, row_of
 from stiffdice.simulation import fast_forward, monitor
 from stiffdice.simulation.criteria.registry import CRITERIA, open_of
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
-from stiffdice.simulation.reference import none
+from stiffdice.simulation.reference import distance
+from stiffdice.simulation.task import Task
 
 SCHEME = "symplectic_euler"
 
-# Fewer members than this are quicker one by one.
+# Fewer members than this are stepped one by one.
 FEWEST = 4
 
-# Rows of a block below those of `batched_kernel.py`. Of the last step: steps done, clearance [m], largest energy in the
-# air so far [J]; of the one before: speed, height, clearance; and the speed of the one before that. What makes a member
-# be shown: due, the step count after which it is, limit [J], rest [m²/s²], live: 1, or 0 for a lane nobody is in.
-DONE, CLEARANCE, WORST, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE = range(
-    batched_kernel.ROWS, batched_kernel.ROWS + 11
-)
-ROWS = batched_kernel.ROWS + 11
+# Longest run of steps in the air until fast-forwarding is tried again, and of any steps until signals are.
+LONGEST, _UNSEEN = 64, 50_000
 
-_ENERGY = list(CRITERIA).index("energy")
+# Steps, about, after which compiled code returns, to see signals and tell progress; and what a member's event counts.
+_WORK, _EVENT = 400_000, 10
+
+# Rows of a block below those of `batched_kernel.py`. Since the member's last event: steps, largest energy in the air
+# [J]. Of the last step: clearance [m], still: 1 if it changed nothing. Of the one before: speed, height, clearance;
+# and the speed of the one before that. What makes an event: due, after so many steps less one, limit [J], rest [m²/s²],
+# live: 1, or 0 for a lane nobody is in. seen: 1 if something else than due made one; most: steps until a whole look.
+DONE, WORST, CLEARANCE, STILL, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE, SEEN, MOST = range(
+    batched_kernel.ROWS, batched_kernel.ROWS + 14
+)
+ROWS = batched_kernel.ROWS + 14
+
+_ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("trajectory")
 
 
 class Balance(NamedTuple):
@@ -65,33 +70,26 @@ class Balance(NamedTuple):
     sag: float
 
 
-@inlined
-def _lowest_moving(body: Moving) -> Any:
-    return abs(body.levels.x) + abs(body.levels.y) + abs(body.levels.z)
+class Limits(NamedTuple):
+    """steps: of the whole run. budget: most to compute of a member. every: keep every K-th state; 0 keeps none."""
+
+    steps: int
+    budget: int
+    every: int
 
 
-@inlined
-def _lowest_turning(body: Turning) -> Any:
-    return abs(body.a.z) + abs(body.b.z) + abs(body.c.z)
+class Common(NamedTuple):
+    """What is the same of all members; the first five are tags."""
 
-
-# (model, body) -> how far below the centre the lowest node is [m].
-_lowest = by_tag({Sliding: _lowest_moving, Tumbling: _lowest_turning}, inlined=True)
-
-
-@inlined
-def _motion_moving(e: Balance, body: Moving) -> Any:
-    return e.half_mass * dot(body.velocity, body.velocity)
-
-
-@inlined
-def _motion_turning(e: Balance, body: Turning) -> Any:
-    turning = e.half_per_inertia * dot(body.momentum, body.momentum)
-    return e.half_mass * dot(body.velocity, body.velocity) + turning
-
-
-# (model, balance, body) -> the kinetic energy [J].
-_kinetic = by_tag({Sliding: _motion_moving, Tumbling: _motion_turning}, inlined=True)
+    scheme: Any
+    width: Any
+    model: Any
+    posture: Any
+    law: Any
+    k: Numbers
+    e: Balance
+    physics: Physics
+    limits: Limits
 
 
 @inlined
@@ -100,73 +98,47 @@ def _total(a: Vector) -> Any:
 
 
 @inlined
-def _size_moving(body: Moving) -> Any:
-    return _total(body.place) + _total(body.velocity)
+def _same(a: Vector, b: Vector) -> Any:
+    return (a.x == b.x) & (a.y == b.y) & (a.z == b.z)
 
 
 @inlined
-def _size_turning(body: Turning) -> Any:
-    return _total(body.place) + _total(body.velocity) + _total(body.momentum) + _total(body.a)
-
-
-# (model, body) -> what is no number below infinity if a part of the state is none.
-_size = by_tag({Sliding: _size_moving, Tumbling: _size_turning}, inlined=True)
-
-
-@inlined
-def _settles_moving(e: Balance, h: float, body: Moving, clearance: Any, rest: Any) -> Any:
-    rubs = (body.velocity.x != 0.0) | (body.velocity.y != 0.0)
-    swing = swing_square(e.omega, h, clearance + e.sag, body.velocity.z)
-    return ((clearance < 0.0) & (swing < rest)) | ~rubs
+def _energy(e: Balance, body: Body) -> Any:
+    """Return kinetic energy + m g z, the velocity at the time of the place [J]."""
+    moving = e.half_mass * dot(body.velocity, body.velocity) + e.half_per_inertia * dot(body.momentum, body.momentum)
+    return ((moving - dot(e.lagging, body.velocity)) + dot(e.weight, body.place)) + e.offset
 
 
 @inlined
-def _settles_turning(e: Balance, h: float, body: Turning, clearance: Any, rest: Any) -> Any:
-    return clearance > math.inf
-
-
-# (model, balance, h, body, clearance, rest) -> who is to be shown because it may rest, or no longer slides.
-_settles = by_tag({Sliding: _settles_moving, Tumbling: _settles_turning}, inlined=True)
-
-
-@njit
-def _moving_in_steps(state: Any) -> bool:
-    """Return whether a cube slides against friction; `pays` has seen to the rest."""
-    return state.velocity[0] != 0.0 or state.velocity[1] != 0.0
-
-
-@njit
-def _turning_in_steps(state: Any) -> bool:
-    return True
-
-
-# (model, state) -> whether `fast_forward.py` knows nothing of the motion, so that every step is taken.
-_in_steps = by_tag({Sliding: _moving_in_steps, Tumbling: _turning_in_steps}, inlined=True)
-
-
-@inlined
-def _run_on(model: Any, posture: Any, law: Any, k: Numbers, e: Balance, block: Array) -> int:
+def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
-    body = batched_kernel.read(model, block)
-    done, clearance = row_of(model, block, DONE), row_of(model, block, CLEARANCE)
-    worst, earlier = row_of(model, block, WORST), row_of(model, block, SPEED)
-    due, limit, rest = row_of(model, block, DUE), row_of(model, block, LIMIT), row_of(model, block, REST)
-    live = row_of(model, block, LIVE) > 0.0
+    width, e = common.width, common.e
+    body = batched_kernel.read(width, block)
+    done, worst, clearance = row_of(width, block, DONE), row_of(width, block, WORST), row_of(width, block, CLEARANCE)
+    earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
+    rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
-        new = batched_kernel.step(model, posture, law, k, body)
-        now = new.place.z - _lowest(model, new)
-        moving = _kinetic(model, e, new) - dot(e.lagging, new.velocity)
-        energy = (moving + dot(e.weight, new.place)) + e.offset
+        new = batched_kernel.step(common.model, common.posture, common.law, common.k, body)
+        now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
+        energy = _energy(e, new)
         up = now > 0.0
-        happens = (up ^ (clearance > 0.0)) | (done >= due) | (up & (energy > limit)) | ~(_size(model, new) < math.inf)
-        happens = live & (happens | _settles(model, e, k.h, new, now, rest))
-        happening = bits(happens) | (bits(live) & batched_kernel.unturned(model, k, new))
+        swing = swing_square(e.omega, common.k.h, now + e.sag, new.velocity.z)
+        settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
+        size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
+        unturned = batched_kernel.unturned(common.k, new)
+        happens = (up ^ (clearance > 0.0)) | (up & (energy > limit)) | (~up & settles)
+        happens = happens | ~(size < math.inf) | unturned
+        happening = bits(live & (happens | (done >= due)))
         done = done + 1.0
         flying = where(up, max(worst, energy), worst)
         if happening != 0:
-            batched_kernel.write(model, block, new)
+            batched_kernel.write(block, new)
+            still = _same(new.velocity, body.velocity) & _same(new.place, body.place) & _same(new.a, body.a)
+            still = still & _same(new.b, body.b) & _same(new.momentum, body.momentum) & ~unturned
             store(block, DONE, done)
             store(block, CLEARANCE, now)
+            store(block, STILL, where(still, 1.0, 0.0))
+            store(block, SEEN, where(happens, 1.0, 0.0))
             store(block, WORST, where(happens, worst, flying))
             store(block, EARLIER, earlier)
             store(block, SPEED, body.velocity.z)
@@ -177,62 +149,30 @@ def _run_on(model: Any, posture: Any, law: Any, k: Numbers, e: Balance, block: A
 
 
 @njit
-def _enter(
-    scheme: Any,
-    model: Any,
-    law: Any,
-    physics: Physics,
-    axes: Array,
-    block: Array,
-    lane: int,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    done: int,
-) -> None:
-    """Let a member go on in a lane."""
-    batched_kernel.enter(axes, state, block, lane)
-    soon = seen.flight == 1.0
-    block[REST, lane] = -1.0
-    if not models.turns(model) and seen.room > 0.0:
-        held = seen.held
-        fast_forward.skip(scheme, model, law, physics, state, seen, 0)
-        soon = soon or seen.held > held
-        swing = fast_forward.resting_swing(law, physics, seen)
-        if seen.held == 0.0 and swing > 0.0:
-            block[REST, lane] = swing * swing
-    block[LIMIT, lane] = math.inf
-    if remembered.decided[_ENERGY] == 0 and remembered.limits[_ENERGY] < math.inf:
-        above = (remembered.limits[_ENERGY] - 1.0) * remembered.energy[2]
-        block[LIMIT, lane] = remembered.energy[1] + above
-    block[DONE, lane], block[DUE, lane] = done, done if soon else seen.steps - 1.0
-    block[CLEARANCE, lane], block[SPEED, lane] = seen.clearance, seen.speed_before
-    block[WORST, lane], block[LIVE, lane] = -math.inf, 1.0
-
-
-@njit
-def _show(
-    model: Any,
-    law: Any,
-    physics: Physics,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    reference: Any,
-    step: int,
-    flown: int,
-) -> bool:
+def _show(common: Common, state: Any, seen: Any, remembered: Any, reference: Any, step: int, flown: int) -> bool:
     """Show a step to all who watch; return whether every number is in range."""
-    monitor.observe(seen, physics, state, step, flown)
-    criteria_observe(remembered, step, seen, model, law, physics, state, reference)
+    monitor.observe(seen, common.physics, state, step, flown)
+    criteria_observe(remembered, step, seen, common.model, common.law, common.physics, state, reference)
     return remembered.finite[0] == 0.0
 
 
 @njit
-def _come_out(
-    model: Any,
-    law: Any,
-    physics: Physics,
+def _until_kept(common: Common, done: int) -> int:
+    """Return the next step whose state is kept, or the last."""
+    steps, _, every = common.limits
+    return min(steps, (done // every + 1) * every) if every > 0 else steps
+
+
+@njit
+def _keep(common: Common, samples: States, state: Any, done: int) -> None:
+    every = common.limits.every
+    if every > 0 and done % every == 0:
+        samples[done // every] = state
+
+
+@njit
+def _only_compared(
+    common: Common,
     axes: Array,
     block: Array,
     lane: int,
@@ -240,138 +180,193 @@ def _come_out(
     seen: Any,
     remembered: Any,
     reference: Any,
+    done: int,
 ) -> bool:
-    """Show the step that a member has just taken in a lane; return whether every number is in range."""
-    batched_kernel.leave(model, axes, block, lane, state)
+    """Compare the step that a member has just taken in a lane; return whether that is all there is to see in it."""
+    taken = block[DONE, lane]
+    time = seen.late + (done + int(taken)) * seen.step_size
+    if block[SEEN, lane] > 0.0 or taken >= block[MOST, lane] or not time < reference.horizon:
+        return False
+    state.position[0], state.position[1], state.position[2] = batched_kernel.place_of(axes, block, lane)
+    off = distance(reference, time, state) / common.physics.radius
+    if off > remembered.limits[_TRAJECTORY] and remembered.decided[_TRAJECTORY] == 0:
+        return False
+    remembered.trajectory[0] = max(remembered.trajectory[0], off)
+    block[DUE, lane] = taken
+    return True
+
+
+@njit
+def _come_out(
+    common: Common,
+    axes: Array,
+    block: Array,
+    lane: int,
+    state: Any,
+    seen: Any,
+    remembered: Any,
+    reference: Any,
+    samples: States,
+    done: int,
+) -> int:
+    """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
+    batched_kernel.leave(common.model, axes, block, lane, state)
     seen.speed, seen.height, seen.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     seen.speed_before = block[EARLIER, lane]
     ratio = 1.0 + (block[WORST, lane] - remembered.energy[1]) / remembered.energy[2]
     remembered.energy[0] = max(remembered.energy[0], ratio)
-    return _show(model, law, physics, state, seen, remembered, reference, int(block[DONE, lane]), 0)
+    step = done + int(block[DONE, lane])
+    every_counts = reference.horizon >= seen.time or (remembered.energy[3] > 0.0 and seen.still == 0.0)
+    if block[STILL, lane] > 0.0 and seen.flight == 0.0 and not every_counts:
+        step = _until_kept(common, done)  # the others would not change anything, either
+    if not _show(common, state, seen, remembered, reference, step, 0):
+        return step - 1
+    _keep(common, samples, state, step)
+    return step
+
+
+@njit
+def _fast_forward(
+    common: Common, state: Any, seen: Any, remembered: Any, reference: Any, samples: States, done: int, left: int
+) -> tuple[int, int, bool]:
+    """Take at once what can be; return the steps done, those to take in a lane, 0 at the end, and if any were taken."""
+    model, law, physics, moved = common.model, common.law, common.physics, False
+    while done < common.limits.steps and open_of(remembered) > 0 and remembered.finite[0] == 0.0:
+        most = _until_kept(common, done) - done
+        if reference.horizon >= seen.time:  # at least as often as the reference is known
+            most = min(most, 1 + int(reference.spacing / seen.step_size))
+        flown = fast_forward.free_steps(model, law, physics, state, seen, most)
+        if flown > 0:
+            schemes.flight(common.scheme, model, physics, state, seen.step_size, flown)
+            moved = True
+            if _show(common, state, seen, remembered, reference, done + flown, flown):
+                done += flown
+                _keep(common, samples, state, done)
+            continue
+        if left <= 0:
+            break
+        held = seen.held
+        skipped = fast_forward.skip(common.scheme, model, law, physics, state, seen, most)
+        most = min(_until_kept(common, done) - done - skipped, left)
+        # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
+        # without ever having left it.
+        if (
+            seen.flight == 1.0
+            or (remembered.energy[3] > 0.0 and seen.still == 0.0)
+            or seen.held > held
+            or fast_forward.follows(common.scheme, model, physics, state, seen)
+        ):
+            most = 1
+        elif seen.flight > 0.0 and fast_forward.may_fly(law, model, seen):
+            most = min(most, LONGEST)
+        return done + skipped, min(most, _UNSEEN), moved or skipped > 0
+    return done, 0, moved
+
+
+@njit
+def _wait(common: Common, block: Array, lane: int, seen: Any, remembered: Any, reference: Any, most: int) -> None:
+    """Let a member go on in a lane for so many steps, or until something happens."""
+    block[REST, lane] = fast_forward.rest_of(common.model, common.law, common.physics, seen) if most > 1 else -1.0
+    block[LIMIT, lane] = math.inf
+    if remembered.decided[_ENERGY] == 0 and remembered.limits[_ENERGY] < math.inf:
+        above = (remembered.limits[_ENERGY] - 1.0) * remembered.energy[2]
+        block[LIMIT, lane] = remembered.energy[1] + above
+    block[DONE, lane], block[MOST, lane], block[WORST, lane] = 0.0, most, -math.inf
+    block[DUE, lane] = 0.0 if reference.horizon >= seen.time else most - 1.0
+    block[CLEARANCE, lane], block[SPEED, lane] = seen.clearance, seen.speed_before
 
 
 @njit(cache=True, nogil=True)
 def _march(
-    scheme: Any,
-    model: Any,
-    posture: Any,
-    law: Any,
-    k: Numbers,
-    e: Balance,
+    common: Common,
     axes: Array,
-    physics: Physics,
     ensemble: States,
     memory: npt.NDArray[np.void],
     sight: npt.NDArray[np.void],
     steps_done: npt.NDArray[np.int64],
     steps_computed: npt.NDArray[np.int64],
-    evaluations: npt.NDArray[np.int64],
     references: npt.NDArray[np.void],
-    steps: int,
+    samples: States,
     block: Array,
+    inside: npt.NDArray[np.int64],
+    waiting: int,
 ) -> int:
-    """Advance members in lanes, as long as they have to take steps; return how many are not at their end then."""
-    inside = np.full(block.shape[1], -1)  # the member in each lane
-    waiting, happening = 0, -1
+    """Advance members in lanes; return the first that waits for one, at least 1, or −1 if all are at their end.
+
+    It returns after _WORK, so that Python can see a signal; where it does changes nothing. inside: the member in each
+    lane, −1 for none. waiting: what it returned last; 0 to begin with.
+    """
+    work, happening = 0, -1 if waiting == 0 else 0
     while True:
         for lane in range(block.shape[1]):
             if not happening >> lane & 1:
                 continue
-            m, goes_on = inside[lane], False
+            m, most, moved = inside[lane], 0, False
             if m >= 0:
-                if models.turns(model):
-                    batched_kernel.turn(block, lane, k.h)
-                taken = int(block[DONE, lane]) - steps_done[m]
+                if models.turns(common.model):
+                    batched_kernel.turn(block, lane, common.k.h)
+                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
+                work += _EVENT
+                if _only_compared(common, axes, block, lane, state, seen, remembered, reference, steps_done[m]):
+                    continue
+                taken = int(block[DONE, lane])
                 steps_computed[m] += taken
-                evaluations[m] += taken
-                state, seen, remembered = ensemble[m], sight[m], memory[m]
-                in_range = _come_out(model, law, physics, axes, block, lane, state, seen, remembered, references[0])
-                steps_done[m] += taken if in_range else taken - 1
-                goes_on = in_range and _flies_on(
-                    scheme, model, law, physics, state, seen, remembered, references[0], steps_done[m:], steps
+                work += taken
+                done = _come_out(common, axes, block, lane, state, seen, remembered, reference, samples, steps_done[m])
+                left = common.limits.budget - steps_computed[m]
+                steps_done[m], most, moved = _fast_forward(
+                    common, state, seen, remembered, reference, samples, done, left
                 )
-            while not goes_on and waiting < ensemble.shape[0]:
-                m = waiting
+            while most == 0 and waiting < len(ensemble):
+                m, moved = waiting, True
                 waiting += 1
-                goes_on = _flies_on(
-                    scheme, model, law, physics, ensemble[m], sight[m], memory[m], references[0], steps_done[m:], steps
+                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
+                steps_done[m], most, _ = _fast_forward(
+                    common, state, seen, remembered, reference, samples, steps_done[m], common.limits.budget
                 )
-            inside[lane], block[LIVE, lane] = -1, 0.0
-            if goes_on:
-                inside[lane] = m
-                _enter(
-                    *(scheme, model, law, physics, axes, block, lane),
-                    *(ensemble[m], sight[m], memory[m], steps_done[m]),
-                )
+            inside[lane] = m if most > 0 else -1
+            block[LIVE, lane] = 1.0 if most > 0 else 0.0
+            if most > 0:
+                if moved:
+                    batched_kernel.enter(axes, ensemble[m], block, lane)
+                _wait(common, block, lane, sight[m], memory[m], references[m % len(references)], most)
         if inside.max() < 0:
-            break
-        happening = _run_on(model, posture, law, k, e, block)
-    left = 0
-    for m in range(ensemble.shape[0]):
-        if steps_done[m] < steps and open_of(memory[m]) > 0 and memory[m].finite[0] == 0.0:
-            left += 1
-    return left
+            return -1
+        if work > _WORK:
+            return max(waiting, 1)
+        happening = _run_on(common, block)
 
 
-@njit
-def _flies_on(
-    scheme: Any,
-    model: Any,
-    law: Any,
-    physics: Physics,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    reference: Any,
-    done: npt.NDArray[np.int64],
-    steps: int,
-) -> bool:
-    """Skip flights; return whether the member then has steps to take; done[0]: of its steps."""
-    while done[0] < steps and open_of(remembered) > 0 and _in_steps(model, state):
-        flown = fast_forward.free_steps(model, law, physics, state, seen, steps - done[0])
-        if flown == 0:
-            return True
-        schemes.flight(scheme, model, physics, state, seen.step_size, flown)
-        if not _show(model, law, physics, state, seen, remembered, reference, done[0] + flown, flown):
-            return False
-        done[0] += flown
-    return False
+def start(task: Task) -> Callable[[], bool] | None:
+    """Return what advances all members for some time and tells whether there is more to do.
 
-
-def march(scene: Scene, model: str, physics: Physics, ensemble: States, watched: Any, steps: int) -> int:
-    """Advance all members of a model in `MODELS` as far as they have to be stepped; return how many are to go on.
-
-    watched: what `simulate` keeps of them, begun. `simulate` goes on with those that are left.
+    None for another scheme, a model in which the ground does not act, and where numbers leave the range of doubles
+    before the first step.
     """
-    h = scene.duration / steps
-    axes = batched_kernel.axes_of(scene)
+    setup, physics, watched = task.setup, task.physics, task.watched
+    scene, model = setup.scene, setup.model
+    if setup.scheme != SCHEME or model not in TOUCHING:
+        return None
+    axes, h = batched_kernel.axes_of(scene), setup.step_size
     k, e = batched_kernel.numbers_of(scene, h), _balance(physics, axes, h, watched.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
-        return len(ensemble)
-    left: int = _march(
-        schemes.SCHEMES[SCHEME],
-        MODELS[model],
-        batched_kernel.posture_of(scene, model, ensemble),
-        LAWS[scene.ground.contact],
-        k,
-        e,
-        axes,
-        physics,
-        ensemble,
-        *watched,
-        none(),
-        steps,
-        np.zeros((ROWS, batched_kernel.WIDTHS[model])),
-    )
-    return left
+        return None
+    width = Alone() if len(task.ensemble) < FEWEST else batched_kernel.ABREAST[model]
+    posture = batched_kernel.posture_of(scene, model, task.ensemble)
+    limits = Limits(setup.steps, task.budget, task.every)
+    common = Common(schemes.SCHEMES[SCHEME], width, task.tags[0], posture, task.tags[1], k, e, physics, limits)
+    lanes = batched_kernel.WIDTHS[type(width)]
+    block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
+    waiting = 0
 
+    def advance() -> bool:
+        nonlocal waiting
+        members = task.ensemble, *watched[:4], task.references, task.samples
+        waiting = _march(common, axes, *members, block, inside, waiting)
+        watched.evaluations[:] = watched.steps_computed
+        return waiting > 0
 
-def pays(scene: Scene, model: str, scheme: str, launches: States) -> bool:
-    """Return whether members of this scene are stepped side by side: enough of them, whose steps nothing can skip."""
-    ground = scene.ground
-    if scheme != SCHEME or len(launches) < FEWEST or ground.contact != "ungated":
-        return False
-    return model == "tumbling" or (model == "sliding" and ground.friction > 0 and ground.normal == (0.0, 0.0, 1.0))
+    return advance
 
 
 def _balance(physics: Physics, axes: Array, h: float, sight: npt.NDArray[np.void]) -> Balance:
@@ -379,10 +374,8 @@ def _balance(physics: Physics, axes: Array, h: float, sight: npt.NDArray[np.void
     behind = schemes.LAGS[SCHEME] * h * physics.gravity
     weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
     with np.errstate(all="ignore"):
-        per_inertia, omega = (
-            np.float64(0.5) / physics.inertia,
-            np.sqrt(4 * physics.stiffness / np.float64(physics.mass)),
-        )
+        per_inertia = np.float64(0.5) / physics.inertia
+        omega = np.sqrt(4 * physics.stiffness / np.float64(physics.mass))
     return Balance(
         0.5 * physics.mass,
         float(per_inertia),

@@ -49,6 +49,12 @@ def _undisturbed(model: Any, law: Any, speed: float, sight: Any) -> float:
 
 
 @njit
+def may_fly(law: Any, model: Any, sight: Any) -> bool:
+    """Return whether a body in the air feels nothing for a while."""
+    return _undisturbed(model, law, sight.speed, sight) > 0.0
+
+
+@njit
 def _until(room: Any, speed: Any, pull: Any, h: Any) -> Any:
     """Return after how many steps of h [s] a body at `speed` [m/s] under `pull` [m/s²] has fallen by `room` [m]."""
     if pull > 0.0:

@@ -22,7 +22,7 @@ from stiffdice.simulation import backend, batch_loop, fast_forward, monitor
 from stiffdice.simulation.backend import Setup
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria.apex import default_hop_height
-from stiffdice.simulation.criteria.energy import ceiling, finish
+from stiffdice.simulation.criteria.energy import finish
 from stiffdice.simulation.criteria.registry import MEMORY, limits_of, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import observe as criteria_observe
 from stiffdice.simulation.criteria.registry import start as criteria_start
@@ -147,8 +147,7 @@ def simulate(
     tolerances = tolerances_of(setup.model, criteria)
     task = _task(setup, tolerance, every, members, stop, references, hop_height, budget)
     leaping = leap or (leap is None and every is None)
-    together = leaping and every is None and progress is None and budget is None and references is None
-    _advance(task, leaping, together, progress)
+    _advance(task, leaping, progress)
     return _judged(task, tolerances)
 
 
@@ -194,29 +193,22 @@ def _task(
     return task
 
 
-def _advance(task: Task, leaping: bool, together: bool, progress: Callable[[float], None] | None) -> None:
-    """Advance every member to its end.
-
-    leaping: take motion that is known at once. together: step members side by side where that pays.
-    """
-    setup, watched, physics = task.setup, task.watched, task.physics
-    scene, model, steps = setup.scene, setup.model, setup.steps
+def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:
+    """Advance every member to its end; leaping: take motion that is known at once."""
+    setup = task.setup
     if setup.simulator != backend.OURS:
         backend.driver().march(task, progress)
         return
-    together = together and not watched.sight["touched"].any()
-    goes_on = True
-    if together and batch_loop.pays(scene, model, setup.scheme, task.ensemble):
-        goes_on = batch_loop.march(scene, model, physics, task.ensemble, watched, steps) > 0
-    while goes_on:  # between two calls of compiled code, Python sees signals
-        goes_on = _march(
+
+    def stepwise() -> bool:
+        goes_on: bool = _march(
             schemes.SCHEMES[setup.scheme],
             *task.tags,
-            physics,
+            task.physics,
             task.ensemble,
-            *watched,
+            *task.watched,
             task.references,
-            steps,
+            setup.steps,
             setup.step_size,
             task.tolerance,
             task.budget,
@@ -224,8 +216,14 @@ def _advance(task: Task, leaping: bool, together: bool, progress: Callable[[floa
             True if leaping else None,
             task.samples,
         )
+        return goes_on
+
+    advance = (batch_loop.start(task) if leaping else None) or stepwise
+    goes_on = True
+    while goes_on:  # between two calls of compiled code, Python sees signals
+        goes_on = advance()
         if progress is not None:
-            progress(watched.fraction(steps, setup.step_size))
+            progress(task.watched.fraction(setup.steps, setup.step_size))
 
 
 def _judged(task: Task, tolerances: dict[str, float]) -> Run:
@@ -390,18 +388,6 @@ def _leap(
         return flown, flown, 0, 0
     if left <= 0:
         return 0, 0, 0, 0
-    held = seen.held
     skipped = fast_forward.skip(scheme, model, law, physics, state, seen, most)
-    most = min(most - skipped, left)
-    # Every step counts where the motion is compared, known by phases, has just come to rest, or goes on without ever
-    # having left the ground.
-    if (
-        compared
-        or (remembered.energy[3] > 0.0 and seen.still == 0.0)
-        or seen.held > held
-        or fast_forward.follows(scheme, model, physics, state, seen)
-    ):
-        most = 1
-    high, low = ceiling(remembered.energy), fast_forward.rest_of(model, law, physics, seen)
-    taken, computed, evaluated = schemes.stretch(scheme, model, law, physics, state, seen, high, low, most, tolerance)
-    return skipped + taken, 0, computed, evaluated
+    taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+    return skipped + taken, 0, taken, evaluated

@@ -63,7 +63,7 @@ STEP = {
 # Part of that while nothing acts on the cube.
 IDLE = 0.7
 
-# A step of the paper's scheme that nobody looks at (`swift.py`).
+# A step of the paper's scheme that nobody looks at (`batch_loop.py`).
 UNSEEN = Price(2e-8, 2e-8, 2e-8, 4.5e-8)
 
 
@@ -108,7 +108,7 @@ BLOCK = 64  # members of one call (`sweep.BLOCK`)
 FIRST_STATES = 256  # that an engine makes before anybody looks (`driver.py`)
 
 # Steps of a landing besides those of its contact: the last ones of the flight, too few to be skipped
-# (`fast_forward.WORTHWHILE`), and those after it until a flight is looked for again: a few, or `swift.LONGEST`.
+# (`fast_forward.WORTHWHILE`), and those after it until a flight is looked for again: a few, or `batch_loop.LONGEST`.
 NEAR, SOON, LATE = 8.0, 4.0, 64.0
 
 # Of a cube that slides freely a contact is known by phases of a quarter of 1/ω at most (`fast_forward.py`). They are

@@ -111,18 +111,9 @@ class Comparison:
         )
 
     def as_json(self) -> str:
-        """Return all of it as JSON."""
+        """Return all of it as JSON, with text for the numbers that JSON does not have."""
         content = asdict(self) | {"verdict": self.verdict, "same": self.same, "numbers_same": self.numbers_same}
-        return json.dumps(_finite(content), indent=2)
-
-
-def _finite(content: Any) -> Any:
-    """Return the same with text for the numbers that JSON does not have."""
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
-    return repr(content) if isinstance(content, float) and content - content != 0 else content
+        return json.dumps(json.loads(json.dumps(content), parse_constant=lambda name: repr(float(name))), indent=2)
 
 
 def _count(number: int, what: str) -> str:

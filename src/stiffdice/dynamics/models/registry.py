@@ -1,7 +1,6 @@
 """Which motion is computed. A model is a module with TAG, `force`, `kick` and `drift`; one line registers it.
 
-What turns the cube, and what the ground touches, is said in `state.py`. A module whose motion is along the vertical
-alone has RISES_ONLY = True.
+What turns the cube, and what the ground touches, is said in `state.py`.
 """
 
 from __future__ import annotations
@@ -43,9 +42,6 @@ turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.ite
 
 # (model) -> whether the ground can act on the body.
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
-
-# (model) -> whether the body moves up and down only, on level ground, so that friction has nothing to act on.
-rises_only = by_tag({type(module.TAG): constant(getattr(module, "RISES_ONLY", False)) for module in _MODULES.values()})
 
 
 @njit

@@ -19,8 +19,6 @@ class Vertical(NamedTuple):
 
 TAG = Vertical()
 
-RISES_ONLY = True
-
 
 @njit
 def force(law: Any, physics: Physics, state: Any) -> Wrench:

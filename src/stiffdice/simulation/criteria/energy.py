@@ -33,10 +33,6 @@ BY_DEFAULT, FOR_TURNING = True, True
 SLOTS = 4
 
 
-# Of the energies: as much as a flight of many steps may add by it, and far below any gain that matters.
-_ROUND_OFF = 1e-12
-
-
 @njit
 def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
@@ -72,12 +68,6 @@ def finish(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
     """Count the last state, if it is on the ground, by the part of its energy that no spring swings with."""
     if sight.clearance <= 0.0:
         _count(slots, _without_springs(physics, state))
-
-
-@njit
-def ceiling(slots: Any) -> float:
-    """Return up to which energy in the air [J] the measure stays what it is, to round-off."""
-    return slots[1] + (slots[0] - 1.0) * slots[2] + _ROUND_OFF * (abs(slots[1]) + slots[2])
 
 
 @njit
