@@ -80,7 +80,7 @@ def cases(effort: Effort) -> Iterator[Case]:
     )
     for name, module, what in (
         ("simulate", "simulation.run", "the simulator"),
-        ("sweep", "sweep.sweep", "what a shard's job needs"),
+        ("sweep", "sweep.shard", "what a shard's job needs"),
     ):
         words = [sys.executable, "-c", f"import stiffdice.{module}"]
         yield process(

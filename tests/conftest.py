@@ -13,7 +13,7 @@ from hypothesis import settings
 from stiffdice.io.reader import parts
 from stiffdice.scene.scene import Scene, from_mapping
 from stiffdice.study import config as study
-from stiffdice.sweep import sweep
+from stiffdice.sweep.collect import collect
 from tests import rounds
 
 # A shell that runs the tests in the background lets them, and all that they start, ignore Ctrl-C.
@@ -103,7 +103,7 @@ def shards(plan, tmp_path_factory):
 @pytest.fixture(scope="session")
 def collected(plan, shards):
     """All cells of that sweep, judged."""
-    return sweep.collect(each(shards), plan.criteria)
+    return collect(each(shards), plan.criteria)
 
 
 def each(paths):

@@ -13,8 +13,10 @@ import yaml
 
 from stiffdice.io.reader import parts
 from stiffdice.study import config as study
-from stiffdice.sweep import partition, sweep
+from stiffdice.sweep import partition
+from stiffdice.sweep.collect import collect
 from stiffdice.sweep.grid import Column, Piece, Sweep
+from stiffdice.sweep.shard import compute_shard
 
 ROOT = Path(__file__).parent.parent
 
@@ -26,7 +28,7 @@ def scan(plan: Sweep, columns: list[Column] | None = None) -> list[Piece]:
 
 def judged(plan: Sweep, paths: list[Path]) -> xr.Dataset:
     """Return what shards add up to."""
-    return sweep.collect((part for path in paths for part in parts(path)), plan.criteria)
+    return collect((part for path in paths for part in parts(path)), plan.criteria)
 
 
 def compute(plan: Sweep, folder: Path) -> list[Path]:
@@ -39,7 +41,7 @@ def compute(plan: Sweep, folder: Path) -> list[Path]:
             cells = partition.later(plan, judged(plan, made), number, len(due))
         for name, pieces in zip(due, cells, strict=True):
             made.append(folder / f"{name}.h5")
-            sweep.compute(plan, pieces, made[-1])
+            compute_shard(plan, pieces, made[-1])
     return made
 
 
@@ -49,7 +51,7 @@ def by_columns(plan: Sweep, size: int, folder: Path) -> list[Path]:
     count = -(-len(columns) // size)
     made = [folder / f"{k:012x}.h5" for k in range(count)]
     for k, path in enumerate(made):
-        sweep.compute(plan, scan(plan, columns[k::count]), path)
+        compute_shard(plan, scan(plan, columns[k::count]), path)
     return made
 
 

@@ -91,7 +91,7 @@ def _key(data: dict[str, Any], cores: int) -> str:
     """Return a digest of all that the numbers depend on, but the machine."""
     digest = hashlib.sha256(json.dumps([data, cores], sort_keys=True).encode())
     digest.update(
-        code_digest("stiffdice.study.config", "stiffdice.sweep.sweep", "stiffdice.sweep.stability_limits").encode()
+        code_digest("stiffdice.study.config", "stiffdice.sweep.shard", "stiffdice.sweep.stability_limits").encode()
     )
     for path in sorted([Path("Snakefile"), *Path("workflow").rglob("*.smk"), *Path("workflow/scripts").glob("*.py")]):
         digest.update(path.read_bytes())

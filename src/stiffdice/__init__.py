@@ -55,9 +55,9 @@ _PUBLIC = {
     "Verdict": "stiffdice.simulation.outcome:Verdict",
     # Which run to make.
     "advise": "stiffdice.advice.recommend:advise",
-    "Advice": "stiffdice.advice.recommend:Advice",
-    "Option": "stiffdice.advice.recommend:Option",
-    "run_advised": "stiffdice.advice.recommend:run_advised",
+    "Advice": "stiffdice.advice.result:Advice",
+    "Option": "stiffdice.advice.result:Option",
+    "run_advised": "stiffdice.advice.check:run_advised",
     # Datasets and files; xarray draws, selects and exports.
     "run_dataset": "stiffdice.simulation.dataset:run_dataset",
     "write_dataset": "stiffdice.io.writer:write_dataset",

@@ -1,4 +1,6 @@
-from stiffdice.advice.recommend import Advice, Option, advise, run_advised
+from stiffdice.advice.check import run_advised
+from stiffdice.advice.recommend import advise
+from stiffdice.advice.result import Advice, Option
 from stiffdice.errors import InputError, OutputError, StiffdiceError
 from stiffdice.io.reader import open_results
 from stiffdice.io.writer import write_dataset

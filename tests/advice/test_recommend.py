@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from stiffdice.advice import pilot as pilot_module
+from stiffdice.advice.check import check, run_advised
 from stiffdice.advice.pilot import SAMPLES, curve, flown, tried
-from stiffdice.advice.recommend import EXTRAPOLATED, MEASURED, advise, check, parsed_error, run_advised
+from stiffdice.advice.recommend import advise, parsed_error
 from stiffdice.advice.report import as_json, as_text, check_as_text, command
+from stiffdice.advice.result import EXTRAPOLATED, MEASURED
 from stiffdice.cli.main import main
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError

@@ -19,7 +19,9 @@ from stiffdice.study import config as study
 from stiffdice.study import job_log, outputs, provenance
 from stiffdice.study.catalogue import TABLES
 from stiffdice.study.output_digest import digest_of
-from stiffdice.sweep import partition, stability_limits, sweep
+from stiffdice.sweep import partition, stability_limits
+from stiffdice.sweep.collect import collect
+from stiffdice.sweep.shard import compute_shard
 
 ROOT = Path(__file__).parent.parent.parent
 SWEEP = {
@@ -89,10 +91,10 @@ def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
             write_dataset(run_dataset(simulate(given, model=run.model, steps=run.steps, every=run.every)), first)
         elif result.stage == "shard":
             grid = planned.sweeps["steps"]
-            sweep.compute(grid, partition.of(grid)[first.stem].pieces, first)
+            compute_shard(grid, partition.of(grid)[first.stem].pieces, first)
         elif result.stage == "collect":
             runs = (part for path in sorted(top.rglob("shards/*.h5")) for part in parts(path))
-            write_dataset(sweep.collect(runs, planned.sweeps["steps"].criteria), first)
+            write_dataset(collect(runs, planned.sweeps["steps"].criteria), first)
             write_bytes(b"shard,cells\n", top / result.files[1])
         elif result.stage == "frontier":
             found = stability_limits.find(open_file(top / "sweeps/steps/sweep.h5"))

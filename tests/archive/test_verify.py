@@ -22,7 +22,8 @@ from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
 from stiffdice.study import job_log
 from stiffdice.study.output_digest import digest_of
-from stiffdice.sweep import stability_limits, sweep
+from stiffdice.sweep import stability_limits
+from stiffdice.sweep.collect import collect
 
 RUN = "results/tiny/runs/fall.h5"
 SWEEP = "results/tiny/sweeps/steps"
@@ -66,7 +67,7 @@ def made(plan, tmp_path_factory):
     small = rounds.in_parts(dataclasses.replace(plan, **spans, members=4, refine=0), 2)
     paths = rounds.compute(small, folder / SWEEP / "shards")
     (folder / SWEEP / "shards.csv").write_text("".join(f"{n},x\n" for n in ["shard", *(p.stem for p in paths)]))
-    collected = sweep.collect((part for path in paths for part in parts(path, 64)), small.criteria)
+    collected = collect((part for path in paths for part in parts(path, 64)), small.criteria)
     write_dataset(collected, folder / SWEEP / "sweep.h5")
     write_dataset(stability_limits.find(collected), folder / SWEEP / "frontier.h5")
     (folder / "src").mkdir()

@@ -31,7 +31,7 @@ def digest_of(copy, module):
     return python(copy, f"from stiffdice.dynamics.code_digest import code_digest; print(code_digest({module!r}))")
 
 
-SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.sweep", "stiffdice.simulation.dataset"}
+SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.shard", "stiffdice.simulation.dataset"}
 DRAWING = {"stiffdice.report.figures.cube"}
 COMPARING = {"stiffdice.experiments.work_precision.measure"}
 DRIVING = {"stiffdice.simulation.engines.driver"}
@@ -44,8 +44,8 @@ DRIVING = {"stiffdice.simulation.engines.driver"}
         ("dynamics/models/tumbling.py", SIMULATION | COMPARING | DRIVING),
         ("simulation/criteria/apex.py", SIMULATION | COMPARING | DRIVING),
         ("simulation/fast_forward.py", SIMULATION | COMPARING),
-        ("simulation/reference_run.py", {"stiffdice.sweep.sweep"}),
-        ("io/shard_writer.py", {"stiffdice.sweep.sweep"}),
+        ("simulation/reference_run.py", {"stiffdice.sweep.shard"}),
+        ("io/shard_writer.py", {"stiffdice.sweep.shard"}),
         ("simulation/engines/scipy_ivp.py", COMPARING | DRIVING),
         ("simulation/engines/octave.m", COMPARING | DRIVING),
         ("simulation/engines/driver.py", DRIVING),
@@ -65,7 +65,7 @@ def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, tou
 
 
 def test_digests_do_not_depend_on_where_the_code_lies(copy):
-    assert digest_of(copy, "stiffdice.sweep.sweep") == code_digest("stiffdice.sweep.sweep")
+    assert digest_of(copy, "stiffdice.sweep.shard") == code_digest("stiffdice.sweep.shard")
 
 
 # A kernel that compiles quickly, and calls what another file says of a height.

@@ -7,9 +7,10 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
 from stiffdice.experiments import failure_map
+from stiffdice.experiments.placement import clearance
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.writer import write_dataset
-from stiffdice.scene.scene import Scene, from_mapping
+from stiffdice.scene.scene import Scene
 from stiffdice.simulation.outcome import BLOW_UP, Verdict
 from stiffdice.simulation.run import simulate
 
@@ -137,20 +138,11 @@ def test_a_pass_with_steps_too_long_is_unresolved():
     assert (named(measured("start", values=[], steps=[1.0])).isel(value=1) == "unresolved").all()
 
 
-def test_starts_are_where_they_are_said_to_be():
-    scene = from_mapping({"cube": {"radius": 2.0, "mass": 3.0}})
-    side, sag = scene.cube.side, 3 * 9.8 / 4e4
-    clearances = {name: failure_map._clearance(start(scene)) for name, start in failure_map.STARTS.items()}
-    expected = {"launch": 3 - side / 2, "at_rest": -sag, "touching": 0, "deep": -side / 2, "far_below": -3 * side}
-    assert clearances == pytest.approx(expected, abs=1e-15)
-    assert failure_map.STARTS["touching"](scene).launch.position[2] == side / 2
-
-
 def test_a_radius_keeps_the_launch_clear_of_the_ground():
     for radius in (1e-9, 1e3):
         scene = failure_map.AXES["radius"].placed(Scene(), radius)
         assert scene.cube.geometry == "exact"
-        assert failure_map._clearance(scene) == pytest.approx(3 - Scene().cube.side / 2)
+        assert clearance(scene) == pytest.approx(3 - Scene().cube.side / 2)
 
 
 def test_everything_is_named_has_units_and_survives_a_file(found, tmp_path):

@@ -11,8 +11,8 @@ from stiffdice.errors import RefusedError
 from stiffdice.io.reader import parts
 from stiffdice.io.writer import write_dataset
 from stiffdice.sweep import partition as dealing
-from stiffdice.sweep import sweep
 from stiffdice.sweep.grid import Column, Piece
+from stiffdice.sweep.shard import checked_shard
 
 pytestmark = pytest.mark.workflow
 
@@ -112,7 +112,7 @@ def shard(plan, shards):
 
 
 def read(shard, plan, pieces, change=lambda part: part):
-    return list(sweep.checked((change(part) for part in parts(shard, 7)), plan, pieces))
+    return list(checked_shard((change(part) for part in parts(shard, 7)), plan, pieces))
 
 
 def test_the_shard_planned_is_passed_on_as_it_is(plan, shard):

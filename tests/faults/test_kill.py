@@ -128,7 +128,7 @@ import json, os, signal, sys, time
 from pathlib import Path
 import numpy as np, xarray as xr
 from stiffdice.scene import scene
-from stiffdice.sweep import sweep
+from stiffdice.sweep.shard import compute_shard
 from stiffdice.sweep.grid import Piece, Sweep
 from stiffdice.io import seal
 from stiffdice.io.shard_writer import Spool
@@ -159,7 +159,7 @@ def by_shard(k, path):
         {"from": 1e2, "to": 1e3, "count": 2}, None, {"from": 3.0, "to": 1.0, "count": 4}, 2, k, 0, {"energy": 0.1},
         True, 1.0,
     )
-    sweep.compute(plan, [Piece(column, tuple(plan.scan(column))) for column in plan.columns()], path)
+    compute_shard(plan, [Piece(column, tuple(plan.scan(column))) for column in plan.columns()], path)
 
 write = globals()["by_" + WHAT]
 target = Path("target.h5")

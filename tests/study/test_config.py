@@ -313,7 +313,7 @@ def test_finer_never_repeats_and_never_leaves_the_scan(plan, passing, rounds):
         ("question", None, "question is missing"),
         ("dpi", 5, "dpi = 5: allowed is a whole number from 50 to 1200"),
         ("runs.figure-04.steps", 0, "runs.figure-04.steps = 0: allowed is a whole number from 1 to"),
-        ("runs.figure-04.every", 30_000, "runs.figure-04.every = 30000"),
+        ("runs.figure-04.every", 30_000, "runs.figure-04: every = 30000"),
         ("runs.figure-04.presets", ["corrected"], "state cube.inertia"),
         ("runs.Figure 4", {"scene": "x", "model": "sliding", "steps": 1}, "Figure 4"),
         ("figures.energy.run", "figure-99", "figures.energy.run = figure-99: allowed is figure-04 or figure-09"),
@@ -356,7 +356,7 @@ def test_a_sweep_of_the_ground_that_a_restitution_is_for_has_it(changed):
 
 
 def test_a_study_that_is_not_there_is_told_with_those_that_are(tmp_path, study_schema):
-    told = r"config/stabilty.yaml: there is no study stabilty; .* quick, stability.*; did you mean stability\?$"
+    told = r"config/stabilty.yaml: there is no study stabilty; .* quick, .*stability.*; did you mean stability\?$"
     with pytest.raises(InputError, match=told):
         study.load(CONFIG / "stabilty.yaml", study_schema)
     with pytest.raises(InputError, match=f"there is no study x; {tmp_path}/ has none$"):

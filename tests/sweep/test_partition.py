@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests import rounds
 from tests.study.test_properties import planned, sweeps
 
-from stiffdice.sweep import partition
+from stiffdice.sweep import cost_model, partition
 from stiffdice.sweep.grid import Column
 
 HARDER = {"from": 1e2, "to": 1e6, "count": 9}
@@ -41,7 +41,7 @@ def test_every_cell_is_in_one_shard_and_in_order(asked):
 def test_no_shard_is_longer_than_asked_by_more_than_half_and_a_cell(asked):
     sweep = planned(asked | {"seconds_per_job": 0.003})
     for shard in first_round(sweep).values():
-        prices = np.concatenate([partition.costs(sweep, piece) for piece in shard.pieces])
+        prices = cost_model.of(sweep, shard.pieces)
         assert shard.seconds == pytest.approx(prices.sum())
         assert prices.sum() <= 1.5 * 0.003 + prices.max()
 
@@ -118,8 +118,9 @@ def test_later_rounds_share_out_their_cells(number, parts):
     dealt = partition.share(sweep, pieces, parts)
     assert len(dealt) == parts
     assert [cell for part in dealt for cell in cells_of(part)] == cells_of(pieces)
-    prices = [sum(float(partition.costs(sweep, piece).sum()) for piece in part) for part in dealt]
-    dearest = max(float(partition.costs(sweep, piece).max()) for piece in pieces)
+    costs = iter(cost_model.of(sweep, pieces).tolist())
+    prices = [sum(next(costs) for _ in cells_of(part)) for part in dealt]
+    dearest = cost_model.of(sweep, pieces).max()
     # Where a part ends is missed by half a cell at most.
     asked = sum(prices) * np.arange(1, parts + 1) / parts
     assert np.abs(np.cumsum(prices) - asked).max() <= dearest / 2 * (1 + 1e-9)
@@ -163,5 +164,5 @@ def test_a_column_may_be_cut(plan):
 
 
 def test_a_plan_is_made_once(plan):
-    """Of 10⁵ stiffnesses it takes a minute, and the workflow asks for it again and again."""
+    """Of 10⁵ stiffnesses it takes seconds, and the workflow asks for it again and again."""
     assert partition.of(plan) is partition.of(plan)

@@ -9,9 +9,10 @@ from tests import rounds
 
 from stiffdice.io.reader import open_file
 from stiffdice.sweep import partition as shards
-from stiffdice.sweep import reuse, sweep
+from stiffdice.sweep import reuse, shard
 from stiffdice.sweep.grid import Piece
 from stiffdice.sweep.reuse import Kept
+from stiffdice.sweep.shard import BLOCK, compute_shard
 
 
 @pytest.fixture(scope="module")
@@ -41,21 +42,21 @@ def extended(small):
 def counted(monkeypatch):
     """Count the runs that are made from now on."""
     made = []
-    run = sweep.simulate
+    run = shard.simulate
 
     def simulate(scene, **options):
         made.append((scene.ground.contact, scene.ground.stiffness, options["steps"]))
         return run(scene, **options)
 
-    monkeypatch.setattr(sweep, "simulate", simulate)
+    monkeypatch.setattr(shard, "simulate", simulate)
     return made
 
 
 def compute(plan, folder):
     """Compute all shards of a sweep of one round as its jobs do."""
     of = shards.of(plan)
-    for name, shard in of.items():
-        sweep.compute(plan, shard.pieces, folder / f"{name}.h5", kept=Kept(plan, shard.pieces, folder, of))
+    for name, planned in of.items():
+        compute_shard(plan, planned.pieces, folder / f"{name}.h5", kept=Kept(plan, planned.pieces, folder, of))
 
 
 def test_an_extended_grid_computes_what_is_new_and_nothing_else(extended, small, folder, tmp_path, monkeypatch):
@@ -76,19 +77,19 @@ def test_cells_of_later_rounds_are_kept_too(small, tmp_path, monkeypatch):
     other = dataclasses.replace(refined, seconds_per_job=1e-4)
     due = shards.refined(other, rounds.judged(refined, paths[:-1]), 1)
     made = counted(monkeypatch)
-    sweep.compute(other, due, tmp_path / "x.h5", kept=Kept(other, due, tmp_path, ()))
+    compute_shard(other, due, tmp_path / "x.h5", kept=Kept(other, due, tmp_path, ()))
     assert due
     assert made == []
     assert survey.sizes["cell"] > sum(len(piece.steps) for piece in shards.scan(refined))
 
 
 def test_blocks_of_members_are_kept(small, tmp_path, monkeypatch):
-    wide = dataclasses.replace(small, members=sweep.BLOCK + 3, stiffness={"from": 1e2, "to": 1e2, "count": 1})
+    wide = dataclasses.replace(small, members=BLOCK + 3, stiffness={"from": 1e2, "to": 1e2, "count": 1})
     rounds.by_columns(wide, 2, tmp_path)
     pieces = [Piece(column, scan[1:]) for column, scan in shards.scan(wide)]
-    sweep.compute(wide, pieces, tmp_path / "anew.h5")
+    compute_shard(wide, pieces, tmp_path / "anew.h5")
     made = counted(monkeypatch)
-    sweep.compute(wide, pieces, tmp_path / "kept.h5", kept=Kept(wide, pieces, tmp_path, ["anew"]))
+    compute_shard(wide, pieces, tmp_path / "kept.h5", kept=Kept(wide, pieces, tmp_path, ["anew"]))
     assert made == []
     assert (tmp_path / "kept.h5").read_bytes() == (tmp_path / "anew.h5").read_bytes()
 
@@ -111,7 +112,6 @@ def test_runs_of_another_kind_are_not_used(small, folder, change):
 
 def test_shards_of_other_code_are_not_used(small, folder, monkeypatch):
     assert len(Kept(small, shards.scan(small), folder, ())) == sum(len(scan) for _, scan in shards.scan(small))
-    monkeypatch.setattr(sweep, "code_digest", lambda *modules: "0" * 64)
     monkeypatch.setattr("stiffdice.simulation.dataset.code_digest", lambda *modules: "0" * 64)
     assert len(Kept(small, shards.scan(small), folder, ())) == 0
 

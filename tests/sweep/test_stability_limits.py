@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.conftest import each
 
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.sweep import stability_limits, sweep
+from stiffdice.sweep import stability_limits
+from stiffdice.sweep.collect import collect
 
 STEPS = np.array([10, 20, 30, 40, 50])
 
@@ -130,7 +131,7 @@ def test_confidence_holds_the_share_and_is_the_same_for_passing_and_failing(give
 @pytest.fixture(scope="module")
 def lax(plan, shards):
     """The same runs, judged by a tolerance that lets all energies pass."""
-    return sweep.collect(each(shards), {"energy": 1e6, "apex": 0.02})
+    return collect(each(shards), {"energy": 1e6, "apex": 0.02})
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +160,7 @@ def test_both_laws_fail_above_the_linear_limit_and_pass_far_below_it(found):
 
 def test_numbers_stay_finite_where_the_energy_does_not(shards):
     """Blowing up is not leaving the range of doubles: below the linear limit no run ends but by the criteria asked."""
-    edges = stability_limits.find(sweep.collect(each(shards), {"finite": 0.0, "energy": 0.05}))
+    edges = stability_limits.find(collect(each(shards), {"finite": 0.0, "energy": 0.05}))
     finite, energy = edges.last_fail.values[:, 0], edges.last_fail.values[:, 1]
     assert (finite <= 1.2 * edges.limit.values).all()
     assert (energy > finite).all()

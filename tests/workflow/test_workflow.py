@@ -24,7 +24,9 @@ from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.scene import load
 from stiffdice.simulation.run import simulate
 from stiffdice.study import config as studies
-from stiffdice.sweep import partition, sweep
+from stiffdice.sweep import partition
+from stiffdice.sweep.collect import collect
+from stiffdice.sweep.shard import compute_shard
 
 ROOT = Path(__file__).parent.parent.parent
 WORK = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml", "set": ["duration=3"]}
@@ -176,8 +178,8 @@ def test_a_stored_run_is_what_the_simulator_says(finished, preset):
 
 def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished, tmp_path):
     plan = planned(finished).sweeps["steps"]
-    sweep.compute(plan, rounds.scan(plan), tmp_path / "whole.h5")
-    whole = sweep.collect(parts(tmp_path / "whole.h5", 10), plan.criteria, plan.config)
+    compute_shard(plan, rounds.scan(plan), tmp_path / "whole.h5")
+    whole = collect(parts(tmp_path / "whole.h5", 10), plan.criteria, plan.config)
     xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweeps/steps/sweep.h5"), whole)
 
 

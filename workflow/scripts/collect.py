@@ -10,7 +10,9 @@ from job import logged
 
 from stiffdice.io.reader import parts
 from stiffdice.io.writer import write_bytes, write_dataset
-from stiffdice.sweep import partition, sweep
+from stiffdice.sweep import partition
+from stiffdice.sweep.collect import collect
+from stiffdice.sweep.shard import checked_shard
 
 snakemake: Any  # Snakemake puts it here
 
@@ -38,7 +40,7 @@ def checked(say: Say) -> Iterator[xr.Dataset]:
         pieces = later[shard.round][shard.part] if shard.round else shard.pieces
         with inputs.reading(path):
             stiffness, steps = [], []
-            for part in sweep.checked(parts(path), asked, pieces):
+            for part in checked_shard(parts(path), asked, pieces):
                 stiffness += part.stiffness.values.tolist()
                 steps += part.steps.values.tolist()
                 if inputs.whole:
@@ -48,7 +50,7 @@ def checked(say: Say) -> Iterator[xr.Dataset]:
 
 
 with logged() as say:
-    found = sweep.collect(checked(say), asked.criteria, asked.config)
+    found = collect(checked(say), asked.criteria, asked.config)
     write_dataset(found, snakemake.output.sweep)
     if snakemake.rule == "collect":
         write_bytes(("\n".join(lines) + "\n").encode(), snakemake.output.table)

@@ -7,8 +7,9 @@ from inputs import opened
 from job import Stopwatch, logged, tenths
 
 from stiffdice.study import job_log
-from stiffdice.sweep import partition, sweep
+from stiffdice.sweep import partition
 from stiffdice.sweep.reuse import Kept
+from stiffdice.sweep.shard import compute_shard
 
 snakemake: Any  # Snakemake puts it here
 
@@ -22,7 +23,7 @@ with logged() as say:
     kept = Kept(planned, pieces, target.parent, plan, say)
     watch = Stopwatch()
     with watch.running():
-        cells = sweep.compute(planned, pieces, target, tenths(say), kept)
+        cells = compute_shard(planned, pieces, target, tenths(say), kept)
     say(job_log.cells(cells, planned.members))
     if kept:
         say(f"of these, {len(kept)} cells kept from shards of an earlier plan")

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from stiffdice.dynamics.model_selection import least_model
 from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.state import Array
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS
@@ -32,6 +33,9 @@ _TWINS = {
     "exact": ((schemes.FINEST, 2), (schemes.FINEST, 3)),
     "event": ((schemes.FINEST, 2), (10 * schemes.FINEST, 1), (10 * schemes.FINEST, 3)),
 }
+
+# A run whose error is expected to be so many times smaller keeps a promise.
+SAFETY = 2.0
 
 # The path is taken to be known to so many times the largest difference of its twins.
 _TWIN_FACTOR = 4
@@ -81,7 +85,7 @@ class Pilot:
     """What a pilot run found; curves have the shape (SAMPLES + 1,), of a run that would end at each time.
 
     floor [1]: how far the path may be off, in radii; round_off [1]: as the twins of the same method tell it. other: the
-    run by another method, None if it took too long; other_method: what it is called, and why there is none. landings:
+    run by another method, None if it took too long; other_method: its name, or why there is none. landings:
     samples at which the ground began to push the cube up.
     """
 
@@ -134,12 +138,7 @@ def tried(
 
     scheme: None takes the simulator's own.
     """
-    begun, fraction = time.perf_counter(), 1.0
-
-    def told(done: float) -> None:
-        nonlocal fraction
-        fraction = done
-
+    begun, fractions = time.perf_counter(), [1.0]
     run = simulate(
         scene,
         model=model,
@@ -150,16 +149,20 @@ def tried(
         every=steps // SAMPLES,
         leap=True,
         budget=budget,
-        progress=told,
+        progress=fractions.append,
     )
     seconds = time.perf_counter() - begun
-    places = np.full((SAMPLES + 1, 3), np.nan)
-    assert run.trajectory is not None
-    places[: len(run.trajectory.state)] = run.trajectory.state["position"]
-    computed = int(run.steps_computed[0])
     whole = run.steps_done[0] == steps or run.measures["out_of_range"][0] > 0
-    evaluations = int(run.evaluations[0])
-    return Trial(run.scheme, steps, tolerance, places, evaluations, computed, seconds, 1.0 if whole else fraction)
+    return Trial(
+        run.scheme,
+        steps,
+        tolerance,
+        states_of(run, SAMPLES)["position"],
+        int(run.evaluations[0]),
+        int(run.steps_computed[0]),
+        seconds,
+        1.0 if whole else fractions[-1],
+    )
 
 
 def flown(scene: Scene, patience: int = PATIENCE) -> Pilot:
@@ -181,7 +184,7 @@ def flown(scene: Scene, patience: int = PATIENCE) -> Pilot:
 
 
 def _by_another_method(scene: Scene, model: str, scheme: str, patience: int) -> tuple[Trial | None, str]:
-    """Return a run by another method than `scheme`, and what that is called; or none, and why."""
+    """Return a run by another method than `scheme`, and its name; or none, and why."""
     name, simulator, other = _OTHERS[scheme]
     most = patience if simulator == OURS else patience // _DEARER
     trial = tried(scene, model, other, SAMPLES, schemes.FINEST, most, simulator)

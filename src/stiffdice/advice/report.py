@@ -8,8 +8,9 @@ import shlex
 from collections.abc import Sequence
 from typing import Any
 
+from stiffdice.advice.check import Check
 from stiffdice.advice.pilot import SAMPLES
-from stiffdice.advice.recommend import Advice, Check, Option
+from stiffdice.advice.result import Advice, Option
 from stiffdice.errors import printable
 
 _HEADINGS = ("scheme", "steps", "tolerance", "error", "time", "", "")
@@ -21,17 +22,18 @@ def as_text(advice: Advice, arguments: Sequence[str]) -> str:
 
     arguments: of `stiffdice run` that name the scene, to show a command; without any none is shown.
     """
-    lines = [_row("model", advice.model_reason), *_advised(advice)]
+    best = advice.best
+    lines = [_row("model", advice.model_reason), *(_none_found(advice) if best is None else _advised(advice, best))]
     if advice.cut:
-        lines.append(_row("until", _until(advice)))
-    if advice.growth is not None and advice.growth_per_landing is not None:
-        told = f"errors grow {_short(advice.growth)} times from the second of {advice.landings} landings to the end"
-        lines.append(_row("growth", f"{told}, {advice.growth_per_landing:.2g} times at each"))
-    if advice.best is not None:
-        lines.append(_row("evidence", f"{advice.best.basis}: {advice.best.evidence}"))
+        lines.append(_row("until", f"t = {advice.horizon:g} s of {advice.duration:g} s: {advice.cut}"))
+    if advice.growth is not None:
+        growth = f"errors grow {_short(advice.growth)} times from the second of {advice.landings} landings to the end"
+        lines.append(_row("growth", f"{growth}, {advice.growth_per_landing:.2g} times at each"))
+    if best is not None:
+        lines.append(_row("evidence", f"{best.basis}: {best.evidence}"))
     lines += [_row("outside", text) for text in advice.outside]
     lines += ["", *_table(advice)]
-    if advice.best is not None and arguments:
+    if best is not None and arguments:
         lines += ["", "  " + command(advice, arguments)]
     return "\n".join(map(printable, lines))
 
@@ -40,13 +42,14 @@ def _row(label: str, text: str) -> str:
     return f"{label.ljust(_LABEL)}{text}"
 
 
-def _advised(advice: Advice) -> list[str]:
-    best = advice.best
-    if best is None:
-        return [
-            _row("scheme", f"none found that keeps {advice.asked:.3g} radii until t = {advice.horizon:g} s"),
-            _row("floor", f"the path itself is known to {_short(advice.floor)} radii"),
-        ]
+def _none_found(advice: Advice) -> list[str]:
+    return [
+        _row("scheme", f"none found that keeps {advice.asked:.3g} radii until t = {advice.horizon:g} s"),
+        _row("floor", f"the path itself is known to {_short(advice.floor)} radii"),
+    ]
+
+
+def _advised(advice: Advice, best: Option) -> list[str]:
     how = f"{best.steps:,} steps"
     if best.omega_h is None:
         tolerance = "" if best.tolerance is None else f"tolerance {best.tolerance:.0e}, "
@@ -63,10 +66,6 @@ def _advised(advice: Advice) -> list[str]:
     ]
 
 
-def _until(advice: Advice) -> str:
-    return f"t = {advice.horizon:g} s of {advice.duration:g} s: {advice.cut}"
-
-
 def _work(option: Option) -> str:
     if option.scheme == "exact":
         return f"{_short(option.evaluations)} pieces in closed form"
@@ -81,15 +80,15 @@ def _margin(option: Option, mode: str) -> str:
         return f"none needed: {option.scheme} takes steps of its own and has no stability limit"
     if option.margin is None:
         return "none needed: nothing touches"
-    if math.isinf(option.margin):
-        return f"none needed: {option.scheme} is stable at any step; ωh = {option.omega_h:.2g} ({mode})"
     step = f"ωh = {option.omega_h:.2g} ({mode})"
+    if math.isinf(option.margin):
+        return f"none needed: {option.scheme} is stable at any step; {step}"
     if not option.limit:
         return f"none: {step}, stability limit ωh = 0: an error in contact grows at any step"
     limit = f"stability limit ωh = {option.limit:.3g}"
-    return (
-        f"none: {step}, beyond the {limit}" if option.margin < 1 else f"{_short(option.margin)} times: {step}, {limit}"
-    )
+    if option.margin < 1:
+        return f"none: {step}, beyond the {limit}"
+    return f"{_short(option.margin)} times: {step}, {limit}"
 
 
 def _table(advice: Advice) -> list[str]:
@@ -150,16 +149,15 @@ def command(advice: Advice, arguments: Sequence[str]) -> str:
 
 def check_as_text(check: Check) -> str:
     """Return in two lines what was promised and what was found."""
-    found = (
-        "no number: the runs left the range of doubles" if math.isinf(check.found) else f"{_short(check.found)} radii"
-    )
+    found = f"{_short(check.found)} radii"
+    if math.isinf(check.found):
+        found = "no number: the runs left the range of doubles"
     verdict = "kept" if check.kept else "NOT KEPT: take a smaller --error, and tell us the scene"
-    return "\n".join(
-        [
-            _row("promised", f"{check.promised:.3g} radii"),
-            _row("found", f"{found}, against {check.against}: {verdict}"),
-        ]
-    )
+    rows = [
+        _row("promised", f"{check.promised:.3g} radii"),
+        _row("found", f"{found}, against {check.against}: {verdict}"),
+    ]
+    return "\n".join(rows)
 
 
 def as_json(advice: Advice, check: Check | None = None) -> str:

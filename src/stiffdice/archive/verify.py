@@ -27,7 +27,7 @@ from stiffdice.io.reader import open_file, parts
 from stiffdice.io.text_file import text_of
 from stiffdice.study import config as studies
 from stiffdice.study import job_log, output_digest, provenance
-from stiffdice.sweep import sweep
+from stiffdice.sweep.collect import collect
 
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
 _SCHEMA = Path("workflow/schemas/study.schema.yaml")
@@ -280,7 +280,7 @@ class _Files:
         try:
             criteria = meanings_of(collected["criterion"])
             tolerances = dict(zip(criteria, map(float, collected["tolerance"].values), strict=True))
-            again = sweep.collect(each(), tolerances)
+            again = collect(each(), tolerances)
         except Exception as error:  # whatever hostile shards make of it
             for _ in each():  # those that it did not come to
                 pass

@@ -121,6 +121,8 @@ def _advise(options: argparse.Namespace) -> int:
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
     from stiffdice.advice import report as advice_text
+    from stiffdice.advice.check import check as checked
+    from stiffdice.advice.check import run_advised
     from stiffdice.cli.progress import notes, progress
     from stiffdice.simulation.outcome import Verdict
 
@@ -130,9 +132,9 @@ def _advise(options: argparse.Namespace) -> int:
     check = None
     if options.run and given.best is not None:
         with progress() as show:
-            run = recommend.run_advised(given, given.best, show)
+            run = run_advised(given, given.best, show)
         with progress() as show:
-            check = recommend.check(given, run, show)
+            check = checked(given, run, show)
         if target is not None:
             from stiffdice.io.writer import write_dataset
             from stiffdice.simulation.dataset import run_dataset

@@ -13,7 +13,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,7 +20,9 @@ import xarray as xr
 from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import Array
-from stiffdice.errors import InputError
+from stiffdice.experiments import options
+from stiffdice.experiments.bisection import bisected
+from stiffdice.experiments.layout import CONTACT, quantity
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -31,7 +32,10 @@ from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
-# Of the ωh at which the gain is looked at, evenly in the logarithm: the gain's own teeth are 1/n apart.
+_CRITERIA = {"apex": apex.TOLERANCE}
+_LARGEST_RATIO = apex.BASE + apex.TOLERANCE
+
+# Values of ωh at which the gain is computed, evenly in the logarithm: the gain's own teeth are 1/n apart.
 _FINE = 4000
 
 
@@ -52,14 +56,10 @@ def measure(
 
     Raises InputError for a number out of range.
     """
-    heights = [validation.number("hop_height", value, "m", at_least=0) for value in hop_height]
-    durations = [validation.number("duration", value, "s", above=0) for value in duration]
-    ends = [validation.number("omega_h", value, "1", above=0) for value in omega_h]
-    if len(ends) != 2 or not ends[0] < ends[1] < linear_theory.STABILITY_LIMIT:
-        raise InputError(
-            f"omega_h = {validation.shown(list(omega_h))}: allowed are two numbers, 0 < low < high < 2 [1]"
-        )
-    scan = np.geomspace(ends[0], ends[1], validation.count("count", count, at_least=2))
+    heights = options.numbers("hop_height", hop_height, "m", at_least=0)
+    durations = options.numbers("duration", duration, "s", above=0)
+    low, high = options.span(omega_h, below=linear_theory.STABILITY_LIMIT)
+    scan = np.geomspace(low, high, validation.count("count", count, at_least=2))
     members = validation.count("members", members)
     edges = np.full((len(LAWS), len(durations), len(heights)), np.nan)
     predicted = np.full((len(LAWS), len(heights)), np.nan)
@@ -69,36 +69,56 @@ def measure(
             predicted[k, i] = prediction(ground, height)
             for j, seconds in enumerate(durations):
                 edges[k, j, i] = _last_fail(dataclasses.replace(ground, duration=seconds), height, scan, members)
-    return _dataset(scene, heights, durations, edges, predicted, members)
+    grid = ("contact", "duration", "hop_height")
+    attributes = dataset.provenance_attributes(
+        "Edge of apex by hop height and duration", scene, MODEL, SCHEME, __name__
+    )
+    return xr.Dataset(
+        {
+            "last_fail": quantity(grid, edges, "smallest omega h of the scan at which the apex of a member rises"),
+            "predicted": quantity(
+                grid[::2], predicted, "smallest omega h at which a rebound from the hop height may rise"
+            ),
+        },
+        {
+            "contact": CONTACT,
+            "duration": quantity("duration", durations, "duration of the runs", "s"),
+            "hop_height": quantity("hop_height", heights, "height from which rebounds count", "m"),
+        },
+        attributes
+        | {
+            "members": members,
+            "criteria": dataset.criteria_text(_CRITERIA),
+            "scene_note": "contact law and duration are the table's, not the scene's",
+        },
+    )
 
 
 def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
     """Return the first ωh of an ascending scan at which a member's apex rises; not-a-number if none does."""
-    asked = {"apex": apex.TOLERANCE}
     launches = turned(scene, MODEL, members)
     for omega_h in scan:
         steps = round(linear_theory.steps_for(scene, float(omega_h)))
-        spread = phased(scene, MODEL, steps, members, launches, slice(0, members))
         run = simulate(
             scene,
             model=MODEL,
             scheme=SCHEME,
             steps=steps,
-            members=spread,
-            criteria=asked,
-            stop=asked,
+            members=phased(scene, MODEL, steps, members, launches),
+            criteria=_CRITERIA,
+            stop=_CRITERIA,
             hop_height=height,
         )
-        if (run.measures[apex.MEASURE] > apex.BASE + apex.TOLERANCE).any():
+        if (run.measures[apex.MEASURE] > _LARGEST_RATIO).any():
             return float(linear_theory.omega_h(scene, steps))
     return math.nan
 
 
 def prediction(scene: Scene, height: float) -> float:
     """Return the smallest ωh [1] at which a rebound from a height [m] may go higher by more than `apex` tolerates."""
-    kept = returned(scene, height)
+    ratio = returned(scene, height)
     for omega_h in np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE):
-        if kept * linear_theory.largest_gain(float(omega_h)) > apex.BASE + apex.TOLERANCE:
+        if ratio * linear_theory.largest_gain(float(omega_h)) > _LARGEST_RATIO:
             return float(omega_h)
     return math.nan
 
@@ -117,13 +137,10 @@ def returned(scene: Scene, height: float) -> float:
 
 def _landing_speed(gravity: float, drag: float, height: float) -> float:
     """Return the speed [m/s] after a fall from rest in v' = g − drag·v: height = −v/drag − g/drag² ln(1 − drag·v/g)."""
-    low, high = 0.0, math.sqrt(2 * gravity * height)
+    free = math.sqrt(2 * gravity * height)
     if drag == 0:
-        return high
-    high = min(high, gravity / drag)
-    while low < (middle := (low + high) / 2) < high:
-        low, high = (middle, high) if _fallen(gravity, drag, middle) < height else (low, middle)
-    return low
+        return free
+    return bisected(lambda speed: _fallen(gravity, drag, speed) < height, 0.0, min(free, gravity / drag))[0]
 
 
 def _fallen(gravity: float, drag: float, speed: float) -> float:
@@ -132,34 +149,3 @@ def _fallen(gravity: float, drag: float, speed: float) -> float:
     if part < 1e-4:  # where the logarithm loses its digits, the first two terms of its series
         return speed**2 / (2 * gravity) * (1 + 2 * part / 3)
     return -gravity / drag**2 * (part + math.log1p(-part))
-
-
-def _dataset(
-    scene: Scene, heights: list[float], durations: list[float], edges: Array, predicted: Array, members: int
-) -> xr.Dataset:
-    variables: dict[str, Any] = {
-        "last_fail": (
-            ("contact", "duration", "hop_height"),
-            edges,
-            {"long_name": "smallest omega h of the scan at which the apex of a member rises", "units": "1"},
-        ),
-        "predicted": (
-            ("contact", "hop_height"),
-            predicted,
-            {"long_name": "smallest omega h at which a rebound from the hop height may rise", "units": "1"},
-        ),
-    }
-    coordinates: dict[str, Any] = {
-        "contact": ("contact", np.arange(len(LAWS), dtype=np.int8), dataset.CONTACT_ATTRIBUTES),
-        "duration": ("duration", durations, {"long_name": "duration of the runs", "units": "s"}),
-        "hop_height": ("hop_height", heights, {"long_name": "height from which rebounds count", "units": "m"}),
-    }
-    attributes = dataset.provenance_attributes(
-        "Edge of apex by hop height and duration", scene, MODEL, SCHEME, "stiffdice.experiments.apex_edge"
-    )
-    attributes |= {
-        "members": members,
-        "criteria": dataset.criteria_text({"apex": apex.TOLERANCE}),
-        "scene_note": "contact law and duration are the table's, not the scene's",
-    }
-    return xr.Dataset(variables, coordinates, attributes)

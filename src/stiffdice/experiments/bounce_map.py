@@ -23,7 +23,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -31,6 +30,9 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import Array, Ensemble, start_of
 from stiffdice.errors import InputError
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import Variable, of_cells, quantity
+from stiffdice.experiments.placement import contact_frequency, landing_speed, level
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Launch, Scene
@@ -41,9 +43,6 @@ MODEL, SCHEME = "sliding", "symplectic_euler"
 
 # A contact is π/(ωh) steps long.
 _LOWEST = 0.01
-# How deep the cube goes, in units of the side: so that round-off in its height, 1e-16, is none in the phase; and so
-# that its upper nodes stay above the ground.
-_DEPTHS = 1e-4, 0.5
 # Gravity over the acceleration that stops the cube, g/(ωv): the cube must not be back before the run ends.
 _WEIGHT = 0.1
 
@@ -61,54 +60,65 @@ def measure(
 
     Raises InputError for a number out of range, and for a scene whose cube would not bounce flat and short.
     """
-    scan = _scan(omega_h, validation.count("count", count, at_least=2))
-    phase = np.arange(validation.count("phases", phases)) / phases
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    speed = _speed(scene, omega)
-    weightless = dataclasses.replace(_on_level_ground(scene), gravity=0.0)
-    gain = np.array([_gain(weightless, speed, value / omega, phase) for value in scan])
-    weighed = np.array([_gain(_on_level_ground(scene), speed, value / omega, phase) for value in scan])
-    return _dataset(scene, speed, scan, phase, gain, np.abs(weighed).max(axis=1))
-
-
-def _scan(span: Sequence[float], count: int) -> Array:
-    """Return the values of ωh, ascending."""
-    ends = [validation.number("omega_h", value, "1") for value in span]
-    if len(ends) != 2 or not _LOWEST <= ends[0] < ends[1] < linear_theory.STABILITY_LIMIT:
-        raise InputError(
-            f"omega_h = {validation.shown(list(span))}: allowed are two numbers, {_LOWEST:g} <= low < high < 2 [1]"
-        )
-    low, high = ends
+    low, high = options.span(omega_h, _LOWEST, linear_theory.STABILITY_LIMIT)
     magic = linear_theory.magic_steps(low, high)
     between = [linear_theory.magic_step(n - 0.5) for n in (*magic, max(magic, default=1) + 1)]
-    inside = [value for value in between if low <= value <= high]
-    # The exact ends: geomspace's may differ in the last digit.
-    return np.unique([low, *np.geomspace(low, high, count)[1:-1], high, *magic.values(), *inside])
-
-
-def _on_level_ground(scene: Scene) -> Scene:
-    return scene.with_ground(normal=(0.0, 0.0, 1.0), friction=0.0, damping=0.0, contact="gated")
-
-
-def _speed(scene: Scene, omega: float) -> float:
-    """Return the speed [m/s] with which the scene's launch, in free fall, meets level ground with its lower face."""
-    fall = scene.launch.position[2] - scene.cube.side / 2
-    speed = math.sqrt(max(0.0, scene.launch.velocity[2] ** 2 + 2 * scene.gravity * fall))
-    low, high = (part * scene.cube.side for part in _DEPTHS)
-    if not low * omega <= speed <= high * omega:
-        raise InputError(
-            f"launch: the cube meets the ground at v = {speed:.3g} m/s, with ω = {omega:.3g} rad/s; allowed is a depth "
-            f"v/ω of {low:.3g} to {high:.3g} [m]"
-        )
+    count = validation.count("count", count, at_least=2)
+    scan = options.scan(low, high, count, [*magic.values(), *between])
+    phase = np.arange(validation.count("phases", phases)) / phases
+    omega, speed = contact_frequency(scene), landing_speed(scene)
     if scene.gravity > _WEIGHT * omega * speed:
         most = _WEIGHT * omega * speed
         raise InputError(f"gravity = {scene.gravity:g}: allowed is at most {_WEIGHT:g} ω v = {most:.3g} [m/s²]")
-    return speed
+    heavy = level(scene, friction=0.0, damping=0.0)
+    weightless = dataclasses.replace(heavy, gravity=0.0)
+    gain, weighed = (
+        np.array([_gain(there, speed, value / omega, phase) for value in scan]) for there in (weightless, heavy)
+    )
+    attributes = dataset.provenance_attributes("Energy of single bounces", scene, MODEL, SCHEME, __name__)
+    attributes["scene_note"] = (
+        "launch, damping and friction are the experiment's, not the scene's, and gravity is off but for "
+        "largest_with_gravity; ground: level, gated"
+    )
+    return xr.Dataset(
+        _by_omega_h(gain, weighed, scan, 2 * scene.gravity * (scan / omega) / speed)
+        | {
+            "energy_gain": quantity(
+                ("omega_h", "phase"), gain, "e^2 - 1 of one bounce without damping, friction and gravity"
+            ),
+            "speed": quantity((), speed, "speed at which the cube meets the ground", "m s-1"),
+        },
+        {
+            "omega_h": of_cells("omega_h", scan),
+            "phase": quantity("phase", phase, "fraction of the step before the node meets the ground"),
+        },
+        attributes,
+    )
+
+
+def _by_omega_h(gain: Array, weighed: Array, scan: Array, gravity_theory: Array) -> dict[str, Variable]:
+    described = {
+        "largest_gain": (gain.max(axis=1), "largest energy gain over the phases"),
+        "smallest_gain": (gain.min(axis=1), "smallest energy gain over the phases"),
+        "mean_gain": (gain.mean(axis=1), "mean energy gain over the phases"),
+        "largest_gain_theory": (
+            [linear_theory.largest_gain(value) - 1 for value in scan],
+            "largest energy gain by theory",
+        ),
+        "gain_bound": ([linear_theory.gain_bound(value) - 1 for value in scan], "1/(1 - (omega h)^2/4) - 1"),
+        "loss_bound": (scan**2 / 4, "(omega h)^2/4, the bound of a loss, and of a gain where omega h is small"),
+        "largest_with_gravity": (
+            np.abs(weighed).max(axis=1),
+            "largest size of the energy gain over the phases, with the scene's gravity",
+        ),
+        "gravity_theory": (gravity_theory, "2 g h/v, the size that gravity gives it at a magic step"),
+    }
+    return {name: quantity("omega_h", *pair) for name, pair in described.items()}
 
 
 def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
     """Return e²−1 of one bounce at each phase, from the kinetic energy at zero height, before and after."""
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    omega = contact_frequency(scene)
     # Weight lengthens the contact from half a period by twice the angle it takes up to the sag.
     contact = (math.pi + 2 * math.atan(scene.gravity / (omega * speed))) / (2 * math.asin(omega * h / 2))
     steps = 4 + math.ceil(contact)
@@ -126,43 +136,3 @@ def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
     upward = end["velocity"][:, 2] - lag
     gain: Array = (upward**2 + 2 * scene.gravity * left) / speed**2 - 1
     return gain
-
-
-def _dataset(scene: Scene, speed: float, scan: Array, phase: Array, gain: Array, weighed: Array) -> xr.Dataset:
-    step = scan / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    described: tuple[tuple[str, Array, str], ...] = (
-        ("largest_gain", gain.max(axis=1), "largest energy gain over the phases"),
-        ("smallest_gain", gain.min(axis=1), "smallest energy gain over the phases"),
-        ("mean_gain", gain.mean(axis=1), "mean energy gain over the phases"),
-        (
-            "largest_gain_theory",
-            np.array([linear_theory.largest_gain(value) - 1 for value in scan]),
-            "largest energy gain by theory",
-        ),
-        ("gain_bound", np.array([linear_theory.gain_bound(value) - 1 for value in scan]), "1/(1 - (omega h)^2/4) - 1"),
-        ("loss_bound", scan**2 / 4, "(omega h)^2/4, the bound of a loss, and of a gain where omega h is small"),
-        ("largest_with_gravity", weighed, "largest size of the energy gain over the phases, with the scene's gravity"),
-        ("gravity_theory", 2 * scene.gravity * step / speed, "2 g h/v, the size that gravity gives it at a magic step"),
-    )
-    variables: dict[str, Any] = {
-        name: ("omega_h", values, {"long_name": meaning, "units": "1"}) for name, values, meaning in described
-    } | {
-        "energy_gain": (
-            ("omega_h", "phase"),
-            gain,
-            {"long_name": "e^2 - 1 of one bounce without damping, friction and gravity", "units": "1"},
-        ),
-        "speed": ((), speed, {"long_name": "speed at which the cube meets the ground", "units": "m s-1"}),
-    }
-    coordinates: dict[str, Any] = {
-        "omega_h": ("omega_h", scan, dataset.CELL_ATTRIBUTES["omega_h"]),
-        "phase": ("phase", phase, {"long_name": "fraction of the step before the node meets the ground", "units": "1"}),
-    }
-    attributes = dataset.provenance_attributes(
-        "Energy of single bounces", scene, MODEL, SCHEME, "stiffdice.experiments.bounce_map"
-    )
-    attributes["scene_note"] = (
-        "launch, damping and friction are the experiment's, not the scene's, and gravity is off but for "
-        "largest_with_gravity; ground: level, gated"
-    )
-    return xr.Dataset(variables, coordinates, attributes)

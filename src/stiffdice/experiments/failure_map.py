@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,10 +19,12 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array
 from stiffdice.errors import InputError
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import CONTACT, Variable, enum, of_cells, quantity
+from stiffdice.experiments.placement import STARTS, at_clearance, clearance, contact_frequency, fall_speed, relaunched
 from stiffdice.integrators.linear_stability import fewest_steps, half_turn_steps
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -42,42 +44,16 @@ def _with_mass(scene: Scene, mass: float) -> Scene:
 def _with_radius(scene: Scene, radius: float) -> Scene:
     """Return the scene with a true cube of this radius [m], launched as high above the ground as the scene's own."""
     cube = dataclasses.replace(scene.cube, radius=radius, geometry="exact")
-    return _at_clearance(dataclasses.replace(scene, cube=cube), _clearance(scene))
+    return at_clearance(dataclasses.replace(scene, cube=cube), clearance(scene))
 
 
 def _with_spin(scene: Scene, rate: float) -> Scene:
     x, y, z = (float(part) for part in _SPIN_ABOUT * rate * scene.cube.moment_of_inertia)
-    return dataclasses.replace(scene, launch=dataclasses.replace(scene.launch, angular_momentum=(x, y, z)))
+    return relaunched(scene, angular_momentum=(x, y, z))
 
 
-def _clearance(scene: Scene) -> float:
-    """Return how far above the ground the lowest node is at the launch [m]."""
-    nodes = start_of(scene, "sliding")["node_offset"][0]
-    return float(((nodes + scene.launch.position) @ np.array(scene.ground.normal)).min())
-
-
-def _at_clearance(scene: Scene, clearance: float) -> Scene:
-    """Return the scene moved along the ground's normal until its lowest node is so high above the ground [m]."""
-    normal, place = np.array(scene.ground.normal), np.array(scene.launch.position)
-    # The height anew, not a difference: it shall be exact to the last bit on level ground.
-    height = clearance - float((start_of(scene, "sliding")["node_offset"][0] @ normal).min())
-    x, y, z = (float(part) for part in place - normal * (normal @ place) + normal * height)
-    launch = dataclasses.replace(scene.launch, position=(x, y, z))
-    return dataclasses.replace(scene, launch=launch)
-
-
-def _still(scene: Scene, clearance: float) -> Scene:
-    still = dataclasses.replace(scene.launch, velocity=(0.0, 0.0, 0.0), angular_momentum=(0.0, 0.0, 0.0))
-    return _at_clearance(dataclasses.replace(scene, launch=still), clearance)
-
-
-STARTS: Mapping[str, Callable[[Scene], Scene]] = {
-    "launch": lambda scene: scene,
-    "at_rest": lambda scene: _still(scene, -min(linear_theory.sag(scene), scene.cube.side)),
-    "touching": lambda scene: _still(scene, 0.0),
-    "deep": lambda scene: _still(scene, -scene.cube.side / 2),
-    "far_below": lambda scene: _still(scene, -3 * scene.cube.side),
-}
+def _with_ground(key: str) -> Callable[[Scene, float], Scene]:
+    return lambda scene, value: scene.with_ground(**{key: value})
 
 
 class Axis(NamedTuple):
@@ -94,28 +70,12 @@ def _decades(first: int, last: int) -> list[float]:
     return [float(f"1e{exponent}") for exponent in range(first, last + 1)]
 
 
+_ALL_ELSE = "all else as in the scene"
+
 AXES: dict[str, Axis] = {
-    "stiffness": Axis(
-        "ground stiffness",
-        "kg s-2",
-        [0.0, *_decades(-6, 16)],
-        lambda scene, value: scene.with_ground(stiffness=value),
-        "all else as in the scene",
-    ),
-    "damping": Axis(
-        "ground damping",
-        "kg s-1",
-        [0.0, *_decades(-3, 12)],
-        lambda scene, value: scene.with_ground(damping=value),
-        "all else as in the scene",
-    ),
-    "friction": Axis(
-        "friction coefficient",
-        "1",
-        [0.0, *_decades(-3, 3)],
-        lambda scene, value: scene.with_ground(friction=value),
-        "all else as in the scene",
-    ),
+    "stiffness": Axis("ground stiffness", "kg s-2", [0.0, *_decades(-6, 16)], _with_ground("stiffness"), _ALL_ELSE),
+    "damping": Axis("ground damping", "kg s-1", [0.0, *_decades(-3, 12)], _with_ground("damping"), _ALL_ELSE),
+    "friction": Axis("friction coefficient", "1", [0.0, *_decades(-3, 3)], _with_ground("friction"), _ALL_ELSE),
     "mass": Axis("mass of the cube", "kg", _decades(-9, 9), _with_mass, "ground and launch as in the scene"),
     "radius": Axis(
         "radius of the cube, exact geometry",
@@ -164,12 +124,30 @@ def measure(
         raise InputError(f"model = {model}: allowed for axis spin is {' or '.join(sorted(TURNING & TOUCHING))}")
     if axis == "start" and values:
         raise InputError("values: not for axis start, whose values have names")
-    span = [validation.number("values", value, chosen.units) for value in values] or list(chosen.values)
-    counts = [validation.count("steps", count) for count in steps]
+    span = options.numbers("values", values, chosen.units) or list(chosen.values)
+    counts = options.counts("steps", steps)
     budget = validation.count("budget", budget)
     placed = [[chosen.placed(scene.with_ground(contact=law), value) for value in span] for law in LAWS]
     runs = [[[_run(there, model, count, budget) for count in counts] for there in row] for row in placed]
-    return _dataset(scene, axis, model, span, counts, budget, placed, runs)
+    attributes = dataset.provenance_attributes(
+        f"Verdicts from nothing to far beyond use: {axis}", scene, model, SCHEME, __name__
+    )
+    attributes |= {
+        "axis": axis,
+        "kept": chosen.kept,
+        "budget": budget,
+        "criteria": dataset.criteria_text(runs[0][0][0].tolerances),
+        "scene_note": f"contact law and {axis} are the cell's, not the scene's",
+    }
+    coordinates = {
+        "contact": CONTACT,
+        "value": enum("value", list(STARTS), chosen.long_name)
+        if axis == "start"
+        else quantity("value", np.array(span, float), chosen.long_name, chosen.units),
+        "steps": of_cells("steps", counts),
+        "limit": enum("limit", LIMITS, "limit by theory"),
+    }
+    return xr.Dataset(_variables(model, counts, placed, runs), coordinates, attributes)
 
 
 def _run(scene: Scene, model: str, steps: int, budget: int) -> Run:
@@ -188,14 +166,13 @@ def _only_takes(scene: Scene, steps: int) -> bool:
     exceeds the launch's if k does not. The push: 4 g m at most for the weight, S d and D u for the deepest and the
     fastest that the fall from the launch's top allows; all that doubled, for steps that are not short.
     """
-    cube, ground, (along_x, along_y, along_z) = scene.cube, scene.ground, scene.launch.velocity
-    h, omega = scene.duration / steps, linear_theory.contact_frequency(ground.stiffness, cube.mass)
-    drag = 8 * ground.damping / cube.mass
-    clearance = _clearance(scene)
-    level = ground.normal == (0.0, 0.0, 1.0) and scene.launch.orientation == (0.0, 0.0, 0.0) and clearance > 0
+    ground, (along_x, along_y, _) = scene.ground, scene.launch.velocity
+    h, omega = scene.duration / steps, contact_frequency(scene)
+    drag, above = 8 * ground.damping / scene.cube.mass, clearance(scene)
+    level = ground.normal == (0.0, 0.0, 1.0) and scene.launch.orientation == (0.0, 0.0, 0.0) and above > 0
     if not level or omega * h > 0.25 or drag * h > 0.99:
         return False
-    fall = math.sqrt(along_z**2 + 2 * scene.gravity * clearance)
+    fall = fall_speed(scene, above)
     fastest = fall + scene.gravity * (min(scene.duration, 1 / omega) if omega > 0 else scene.duration)
     push = 4 * scene.gravity + 2 * omega * fall + drag * fastest
     return 2 * ground.friction * h * push <= math.hypot(along_x, along_y)
@@ -215,70 +192,36 @@ def _limits(scene: Scene, model: str) -> list[float]:
     return [part if part > 0 else math.nan for part in (contact, drag, turn, float(stall))]
 
 
-def _dataset(
-    scene: Scene,
-    axis: str,
-    model: str,
-    values: Sequence[float],
-    steps: Sequence[int],
-    budget: int,
-    placed: Sequence[Sequence[Scene]],
-    runs: Sequence[Sequence[Sequence[Run]]],
-) -> xr.Dataset:
+def _variables(
+    model: str, counts: Sequence[int], placed: Sequence[Sequence[Scene]], runs: Sequence[Sequence[Sequence[Run]]]
+) -> dict[str, Variable]:
+    """Return what came of the runs, by contact, value and steps, and the limits by theory."""
     grid = ("contact", "value", "steps")
 
-    def of_runs(kind: type, pick: Callable[[Run], Any]) -> Array:
-        return np.array([[[pick(run) for run in row] for row in part] for part in runs], kind)
+    def of_runs(kind: type, value_of: Callable[[Run], Any]) -> Array:
+        return np.array([[[value_of(run)[0] for run in row] for row in part] for part in runs], kind)
 
-    omega_h = [[linear_theory.omega_h(there, count) for count in steps] for there in placed[0]]
+    omega_h = [[linear_theory.omega_h(there, count) for count in counts] for there in placed[0]]
     limits = np.array([[_limits(there, model) for there in row] for row in placed])
-    variables: dict[str, Any] = {
-        "verdict": (grid, of_runs(np.int8, lambda run: run.verdict[0]), dataset.VERDICT_ATTRIBUTES),
-        "steps_done": (grid, of_runs(np.int64, lambda run: run.steps_done[0]), dataset.STEPS_DONE_ATTRIBUTES),
+    return {
+        "verdict": (grid, of_runs(np.int8, lambda run: run.verdict), dataset.VERDICT_ATTRIBUTES),
+        "steps_done": (grid, of_runs(np.int64, lambda run: run.steps_done), dataset.STEPS_DONE_ATTRIBUTES),
         "steps_computed": (
             grid,
-            of_runs(np.int64, lambda run: run.steps_computed[0]),
+            of_runs(np.int64, lambda run: run.steps_computed),
             dataset.STEPS_COMPUTED_ATTRIBUTES,
         ),
-        "omega_h": (grid[1:], omega_h, dataset.CELL_ATTRIBUTES["omega_h"]),
-        "limit_steps": (
+        "omega_h": of_cells("omega_h", omega_h, grid[1:]),
+        "limit_steps": quantity(
             ("limit", *grid[:2]),
             np.moveaxis(limits, -1, 0),
-            {
-                "long_name": "steps at a limit by theory: fewest for contact, drag, turn, most for stall",
-                "units": "1",
-            },
+            "steps at a limit by theory: fewest for contact, drag, turn, most for stall",
         ),
     } | {
         name: (grid, of_runs(float, _measure_of(name)), dataset.MEASURE_ATTRIBUTES[name])
         for name in ("energy_ratio", "apex_ratio")
     }
-    attributes = dataset.provenance_attributes(
-        f"Verdicts from nothing to far beyond use: {axis}", scene, model, SCHEME, "stiffdice.experiments.failure_map"
-    )
-    attributes |= {
-        "axis": axis,
-        "kept": AXES[axis].kept,
-        "budget": budget,
-        "criteria": dataset.criteria_text(runs[0][0][0].tolerances),
-        "scene_note": f"contact law and {axis} are the cell's, not the scene's",
-    }
-    return xr.Dataset(variables, _coordinates(axis, values, steps), attributes)
 
 
-def _measure_of(name: str) -> Callable[[Run], float]:
-    return lambda run: float(run.measures[name][0])
-
-
-def _coordinates(axis: str, values: Sequence[float], steps: Sequence[int]) -> dict[str, Any]:
-    chosen = AXES[axis]
-    if axis == "start":
-        value = np.array(values, np.int8), enum_attributes(chosen.long_name, list(STARTS))
-    else:
-        value = np.array(values, float), {"long_name": chosen.long_name, "units": chosen.units}
-    return {
-        "contact": ("contact", np.arange(len(LAWS), dtype=np.int8), dataset.CONTACT_ATTRIBUTES),
-        "value": ("value", *value),
-        "steps": ("steps", np.array(steps, np.int64), dataset.CELL_ATTRIBUTES["steps"]),
-        "limit": ("limit", np.arange(len(LIMITS), dtype=np.int8), enum_attributes("limit by theory", LIMITS)),
-    }
+def _measure_of(name: str) -> Callable[[Run], Array]:
+    return lambda run: run.measures[name]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,7 +16,10 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.failure_map import STARTS
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import quantity
+from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
+from stiffdice.experiments.sampling import states_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -25,8 +27,8 @@ from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
-# Steps from the start on that are looked at for the swing.
-_SEEN = 200
+# The last steps of a run, whose largest speed is the swing.
+_LAST = 200
 
 # ωh of the cube on its ground: above, the bounce is unstable, too.
 _LONGEST = 1.5
@@ -48,51 +50,46 @@ def measure(
 
     Raises InputError for a number out of range, and for a scene in which the cube does not rest on four nodes.
     """
-    coefficients = [validation.number("friction", value, "1", above=0) for value in friction]
-    steps = validation.count("steps", steps, at_least=2 * _SEEN)
-    level = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated")
+    coefficients = options.numbers("friction", friction, "1", above=0)
+    steps = validation.count("steps", steps, at_least=2 * _LAST)
+    flat = level(scene)
     stiffness, weight = scene.ground.stiffness, scene.cube.mass * scene.gravity
     if not 0 < weight < linear_theory.BOUNCE_NODES * stiffness * scene.cube.side / 2:
         raise InputError(
             f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: allowed are those with which the cube "
             "rests on its lower face"
         )
-    longest = _LONGEST / linear_theory.contact_frequency(stiffness, scene.cube.mass)
-    sizes = [validation.number("step_size", size, "s", above=0) for size in step_size]
+    longest = _LONGEST / contact_frequency(scene)
+    sizes = options.numbers("step_size", step_size, "s", above=0)
     if max(sizes) > longest:
         raise InputError(f"step_size = {max(sizes):g}: allowed are numbers <= {longest:.3g} [s], ωh = {_LONGEST:g}")
     cutoff = physics_of(scene).cutoff
     theoretical = np.array([[max(0.0, mu * scene.gravity * h / 2 - cutoff) for h in sizes] for mu in coefficients])
-    swings = [[_swing(level, mu, h, steps) for h in sizes] for mu in coefficients]
+    swings = [[_swing(flat, mu, h, steps) for h in sizes] for mu in coefficients]
+    least = [2 * cutoff / (mu * scene.gravity) for mu in coefficients]
     grid = ("friction", "step_size")
-    variables: dict[str, Any] = {
-        "swing": (grid, swings, {"long_name": "largest sliding speed of a cube at rest", "units": "m s-1"}),
-        "swing_theory": (grid, theoretical, {"long_name": "mu g h/2 - cutoff, or nothing", "units": "m s-1"}),
-        "least_step": (
-            grid[:1],
-            [2 * cutoff / (mu * scene.gravity) for mu in coefficients],
-            {"long_name": "step size from which on a cube at rest chatters, 2 cutoff/(mu g)", "units": "s"},
-        ),
-    }
-    coordinates = {
-        "friction": ("friction", coefficients, {"long_name": "friction coefficient", "units": "1"}),
-        "step_size": ("step_size", sizes, {"long_name": "step size", "units": "s"}),
-    }
-    attributes = dataset.provenance_attributes(
-        "Chatter of a cube at rest", level, MODEL, SCHEME, "stiffdice.experiments.friction_chatter"
+    attributes = dataset.provenance_attributes("Chatter of a cube at rest", flat, MODEL, SCHEME, __name__)
+    return xr.Dataset(
+        {
+            "swing": quantity(grid, swings, "largest sliding speed of a cube at rest", "m s-1"),
+            "swing_theory": quantity(grid, theoretical, "mu g h/2 - cutoff, or nothing", "m s-1"),
+            "least_step": quantity(
+                "friction", least, "step size from which on a cube at rest chatters, 2 cutoff/(mu g)", "s"
+            ),
+        },
+        {
+            "friction": quantity("friction", coefficients, "friction coefficient"),
+            "step_size": quantity("step_size", sizes, "step size", "s"),
+        },
+        attributes | {"scene_note": "friction and launch are the experiment's, not the scene's; ground: level, gated"},
     )
-    attributes["scene_note"] = "friction and launch are the experiment's, not the scene's; ground: level, gated"
-    return xr.Dataset(variables, coordinates, attributes)
 
 
-def _swing(level: Scene, friction: float, h: float, steps: int) -> float:
+def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
     """Return the largest sliding speed [m/s] in the last steps of a cube that slid slowly, and should have stopped."""
-    still = STARTS["at_rest"](level.with_ground(friction=friction))
-    sliding = dataclasses.replace(still.launch, velocity=(3 * friction * level.gravity * h, 0.0, 0.0))
     # In a step what is off the swing shrinks by 1 − 4 cutoff/k: to 1e-4 in so many.
-    settling = round(2.5 * friction * level.gravity * h / physics_of(level).cutoff)
-    steps += settling
-    scene = dataclasses.replace(still, launch=sliding, duration=h * steps)
-    run = simulate(scene, model=MODEL, scheme=SCHEME, steps=steps, every=1)
-    assert run.trajectory is not None
-    return float(np.abs(run.trajectory.state["velocity"][-_SEEN:, 0]).max())
+    steps += round(2.5 * friction * flat.gravity * h / physics_of(flat).cutoff)
+    still = STARTS["at_rest"](flat.with_ground(friction=friction))
+    sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
+    run = simulate(dataclasses.replace(sliding, duration=h * steps), model=MODEL, scheme=SCHEME, steps=steps, every=1)
+    return float(np.abs(states_of(run, steps)["velocity"][-_LAST:, 0]).max())

@@ -8,15 +8,17 @@ is itself.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.state import STATE, Array, Ensemble, States
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import of_cells, quantity
+from stiffdice.experiments.placement import relaunched
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -32,8 +34,6 @@ SAMPLES = 12
 
 # Of LSODA: what is taken for right, and what tells how right it is.
 _REFERENCE, _COARSER = 1e-13, 1e-12
-
-_GRID = ("friction", "stiffness", "launch")
 
 
 def measure(
@@ -52,13 +52,11 @@ def measure(
     times its tolerance from its own; both are not-a-number where LSODA did not arrive. Raises InputError for a number
     out of range.
     """
-    coefficients = [validation.number("friction", value, "1", at_least=0) for value in friction]
-    grounds = [validation.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
-    tolerances = [validation.number("tolerance", value, "1", at_least=schemes.FINEST) for value in tolerance]
+    coefficients = options.numbers("friction", friction, "1", at_least=0)
+    grounds = options.stiffnesses(stiffness)
+    tolerances = options.numbers("tolerance", tolerance, "1", at_least=schemes.FINEST)
     launches = validation.count("launches", launches)
-    scene = dataclasses.replace(
-        scene.with_ground(contact="gated"), launch=dataclasses.replace(scene.launch, node_velocity="rigid")
-    )
+    scene = relaunched(scene.with_ground(contact="gated"), node_velocity="rigid")
     starts = turned(scene, MODEL, launches)
     shape = len(coefficients), len(grounds), launches
     error, evaluations = np.full((*shape, len(tolerances)), np.nan), np.zeros((*shape, len(tolerances)), np.int64)
@@ -71,38 +69,28 @@ def measure(
         for t, size in enumerate(tolerances):
             path, evaluations[i, j, k, t] = _by_event(rough, start, size)
             error[i, j, k, t] = _apart(rough, path, right)
-    by_tolerance = (*_GRID, "tolerance")
-    words = "root mean square distance of the centre's path from LSODA's, in radii"
-    variables: dict[str, Any] = {
-        "error": (by_tolerance, error, {"long_name": words, "units": "1"}),
-        "evaluations": (by_tolerance, evaluations, dataset.EVALUATIONS_ATTRIBUTES),
-        "reference_error": (
-            _GRID,
-            reference_error,
-            {"long_name": "the same of LSODA's path at ten times the tolerance", "units": "1"},
-        ),
-        "reference_evaluations": (_GRID, reference_evaluations, {"long_name": "evaluations by LSODA", "units": "1"}),
-    }
-    coordinates = {
-        "friction": ("friction", coefficients, {"long_name": "friction coefficient", "units": "1"}),
-        "stiffness": ("stiffness", grounds, dataset.CELL_ATTRIBUTES["stiffness"]),
-        "launch": (
-            "launch",
-            np.arange(launches),
-            {"long_name": "orientation of the launch, 0 the scene's", "units": "1"},
-        ),
-        "tolerance": ("tolerance", tolerances, {"long_name": "tolerance of the scheme event", "units": "1"}),
-    }
+    grid = ("friction", "stiffness", "launch")
+    by_tolerance = (*grid, "tolerance")
     attributes = dataset.provenance_attributes(
-        "Corners held by friction",
-        scene,
-        MODEL,
-        SCHEME,
-        "stiffdice.experiments.held_contacts",
-        "stiffdice.simulation.engines.scipy_ivp",
+        "Corners held by friction", scene, MODEL, SCHEME, __name__, scipy_ivp.__name__
     )
-    attributes["scene_note"] = "friction, stiffness and orientation are those of the dimensions"
-    return xr.Dataset(variables, coordinates, attributes)
+    return xr.Dataset(
+        {
+            "error": quantity(
+                by_tolerance, error, "root mean square distance of the centre's path from LSODA's, in radii"
+            ),
+            "evaluations": (by_tolerance, evaluations, dataset.EVALUATIONS_ATTRIBUTES),
+            "reference_error": quantity(grid, reference_error, "the same of LSODA's path at ten times the tolerance"),
+            "reference_evaluations": quantity(grid, reference_evaluations, "evaluations by LSODA"),
+        },
+        {
+            "friction": quantity("friction", coefficients, "friction coefficient"),
+            "stiffness": of_cells("stiffness", grounds),
+            "launch": quantity("launch", np.arange(launches), "orientation of the launch, 0 the scene's"),
+            "tolerance": quantity("tolerance", tolerances, "tolerance of the scheme event"),
+        },
+        attributes | {"scene_note": "friction, stiffness and orientation are those of the dimensions"},
+    )
 
 
 def _by_lsoda(scene: Scene, launch: States, tolerance: float) -> tuple[Array, int]:
@@ -117,11 +105,7 @@ def _by_event(scene: Scene, launch: States, tolerance: float) -> tuple[Array, in
     """Return the same by `event`."""
     members = Ensemble(launch, np.zeros(1))
     run = simulate(scene, model=MODEL, scheme=SCHEME, steps=SAMPLES, every=1, tolerance=tolerance, members=members)
-    assert run.trajectory is not None
-    places = np.full((SAMPLES, 3), np.nan)
-    kept = run.trajectory.state["position"][1:]
-    places[: len(kept)] = kept
-    return places, int(run.evaluations[0])
+    return states_of(run, SAMPLES)["position"][1:], int(run.evaluations[0])
 
 
 def _apart(scene: Scene, one: Array, other: Array) -> float:

@@ -8,19 +8,19 @@ runs that start a few units in the last place apart.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.failure_map import STARTS
-from stiffdice.io.cf_enums import enum_attributes
+from stiffdice.experiments.bisection import bisected, geometric
+from stiffdice.experiments.layout import enum, quantity
+from stiffdice.experiments.placement import STARTS, contact_frequency, fall_speed, height_above, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -65,8 +65,8 @@ def measure(
     stiffness = validation.number("stiffness", stiffness, "kg/s²", above=0)
     omega_h = validation.number("omega_h", omega_h, "1", above=0)
     coarse, members = validation.count("coarse", coarse), validation.count("members", members)
-    bare = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated", damping=0.0, friction=0.0)
-    if not (bare.gravity > 0 and bare.launch.velocity[2] > 0 and _clearance(bare) > 0 and omega_h < 1):
+    bare = level(scene, damping=0.0, friction=0.0)
+    if not (bare.gravity > 0 and bare.launch.velocity[2] > 0 and height_above(bare) > 0 and omega_h < 1):
         raise InputError("allowed are launches up from above the ground, under gravity, and omega_h < 1")
     stiff = bare.with_ground(stiffness=stiffness)
     found: dict[str, Found] = {
@@ -80,12 +80,10 @@ def measure(
         "square_of_frequency": _square_of_frequency(bare),
         "first_contact": _first_contact(bare, coarse),
     }
-    numbers = np.array([found[name] for name in LIMITS])
+    predicted, measured = zip(*(found[name] for name in LIMITS), strict=True)
     # Each limit has a unit of its own, which no `units` could say of all.
     unit = "in the unit that limit_units names"
-    attributes = dataset.provenance_attributes(
-        "Limits of double precision", bare, MODEL, SCHEME, "stiffdice.experiments.precision_limits"
-    )
+    attributes = dataset.provenance_attributes("Limits of double precision", bare, MODEL, SCHEME, __name__)
     attributes |= {
         "scene_note": "ground: level, gated, without damping and friction; stiffness as the limit says",
         "limit_meanings": "; ".join(f"{name}: {what}" for name, (what, _) in LIMITS.items()),
@@ -96,16 +94,12 @@ def measure(
     }
     return xr.Dataset(
         {
-            "predicted": ("limit", numbers[:, 0], {"long_name": f"limit by its formula, {unit}", "units": "1"}),
-            "measured": ("limit", numbers[:, 1], {"long_name": f"limit found in this code, {unit}", "units": "1"}),
+            "predicted": quantity("limit", list(predicted), f"limit by its formula, {unit}"),
+            "measured": quantity("limit", list(measured), f"limit found in this code, {unit}"),
         },
-        {"limit": ("limit", np.arange(len(LIMITS), dtype=np.int8), enum_attributes("limit", list(LIMITS)))},
+        {"limit": enum("limit", list(LIMITS), "limit")},
         attributes,
     )
-
-
-def _clearance(scene: Scene) -> float:
-    return scene.launch.position[2] - scene.cube.side / 2
 
 
 def _half_unit(value: float) -> float:
@@ -113,18 +107,11 @@ def _half_unit(value: float) -> float:
     return float(value - np.nextafter(value, 0.0)) / 2
 
 
-def _edge(below: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the number from low to high up to which `below` holds, to nine digits."""
-    assert below(low)
-    assert not below(high)
-    while high / low > 1 + 1e-9:
-        middle = math.sqrt(low) * math.sqrt(high)
-        low, high = (middle, high) if below(middle) else (low, middle)
-    return low
-
-
-def _launched(scene: Scene, **launch: Any) -> Scene:
-    return dataclasses.replace(scene, launch=dataclasses.replace(scene.launch, **launch))
+def _edge(holds: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the number from low to high up to which `holds` is true, to nine digits."""
+    assert holds(low)
+    assert not holds(high)
+    return bisected(holds, low, high, relative=1e-9, middle_of=geometric)[0]
 
 
 def _run(scene: Scene, h: float, steps: int, every: int | None = None) -> Run:
@@ -160,7 +147,7 @@ def _sag_in_height(scene: Scene) -> Found:
 def _spring_at_deepest(scene: Scene) -> Found:
     """There the springs hold m v²/2 and the weight's work on the way, m g d: no stiffness lets them drown."""
     mass, gravity = scene.cube.mass, scene.gravity
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, mass)
+    omega = contact_frequency(scene)
     fall, fast = _landing(scene)
     depth = gravity / omega**2 + math.hypot(gravity / omega**2, fast / omega)
     unit = float(np.spacing(mass * gravity * abs(scene.cube.side / 2 - depth)))
@@ -172,34 +159,28 @@ def _spring_at_deepest(scene: Scene) -> Found:
 
 def _landing(scene: Scene) -> Found:
     """Return when [s] and how fast [m/s] the launch lands."""
-    up = scene.launch.velocity[2]
-    fast = math.sqrt(up**2 + 2 * scene.gravity * _clearance(scene))
-    return (up + fast) / scene.gravity, fast
+    fast = fall_speed(scene, height_above(scene))
+    return (scene.launch.velocity[2] + fast) / scene.gravity, fast
+
+
+def _unchanged(scene: Scene, part: str, predicted: float) -> Found:
+    """Return up to which step size [s] a step leaves the vertical part of the launch as it is."""
+    value = getattr(scene.launch, part)[2]
+    return predicted, _edge(lambda h: _run(scene, h, 1).end[part][0, 2] == value, predicted / 1e3, predicted * 1e3)
 
 
 def _way_in_place(scene: Scene) -> Found:
-    height, speed = scene.launch.position[2], scene.launch.velocity[2]
-    predicted = float(np.spacing(height)) / 2 / speed
-    return predicted, _edge(
-        lambda h: _run(scene, h, 1).end["position"][0, 2] == height, predicted / 1e3, predicted * 1e3
-    )
+    return _unchanged(scene, "position", float(np.spacing(scene.launch.position[2])) / 2 / scene.launch.velocity[2])
 
 
 def _pull_in_speed(scene: Scene) -> Found:
-    speed = scene.launch.velocity[2]
-    predicted = _half_unit(speed) / scene.gravity
-    return predicted, _edge(
-        lambda h: _run(scene, h, 1).end["velocity"][0, 2] == speed, predicted / 1e3, predicted * 1e3
-    )
+    return _unchanged(scene, "velocity", _half_unit(scene.launch.velocity[2]) / scene.gravity)
 
 
 def _first_fall(scene: Scene) -> Found:
     """The first step falls by g h²."""
-    still, height = _launched(scene, velocity=(0.0, 0.0, 0.0)), scene.launch.position[2]
-    predicted = math.sqrt(_half_unit(height) / scene.gravity)
-    return predicted, _edge(
-        lambda h: _run(still, h, 1).end["position"][0, 2] == height, predicted / 1e3, predicted * 1e3
-    )
+    still = relaunched(scene, velocity=(0.0, 0.0, 0.0))
+    return _unchanged(still, "position", math.sqrt(_half_unit(still.launch.position[2]) / scene.gravity))
 
 
 def _growth(scene: Scene, omega_h: float, members: int) -> Found:
@@ -210,7 +191,7 @@ def _growth(scene: Scene, omega_h: float, members: int) -> Found:
     for the part κ of all phases. A speed v e at lift-off changes the flight by 2 v δe/g, and the next place by v times
     that. So a bounce multiplies by v ω² h/g times 2κ or 2(1 − κ): their mean is taken in the logarithm.
     """
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    omega = contact_frequency(scene)
     h = omega_h / omega
     fall, fast = _landing(scene)
     kappa = math.modf(math.pi / (2 * math.asin(omega_h / 2)))[0]
@@ -229,7 +210,7 @@ def _apart(scene: Scene, height: float, h: float, steps: int) -> float:
     """Return by how much the speeds of two runs differ that are launched some units in the last place apart [m/s]."""
     x, y, _ = scene.launch.position
     heights = height, height + _APART * float(np.spacing(height))
-    ends = [_run(_launched(scene, position=(x, y, z)), h, steps).end["velocity"][0, 2] for z in heights]
+    ends = [_run(relaunched(scene, position=(x, y, z)), h, steps).end["velocity"][0, 2] for z in heights]
     return float(abs(ends[1] - ends[0]))
 
 
@@ -240,11 +221,13 @@ def _square_of_frequency(scene: Scene) -> Found:
 
 def _first_contact(scene: Scene, coarse: int) -> Found:
     """The sum of all S d must be in range, and place and speed after the step of h/m times that, added."""
-    h, (_, _, up), low = scene.duration / coarse, scene.launch.velocity, _clearance(scene)
-    steps = 1
-    while low + steps * h * up - scene.gravity * h * h * steps * (steps + 1) / 2 >= 0:
-        steps += 1
-    depth = -(low + steps * h * up - scene.gravity * h * h * steps * (steps + 1) / 2)
+    h, up, low = scene.duration / coarse, scene.launch.velocity[2], height_above(scene)
+
+    def height(steps: int) -> float:
+        return low + steps * h * up - scene.gravity * h * h * steps * (steps + 1) / 2
+
+    steps = next(k for k in itertools.count(1) if height(k) < 0)
+    depth = -height(steps)
     depths = 4 * (depth + max(0.0, depth - scene.cube.side))
     predicted = LARGEST / depths / max(1.0, h / scene.cube.mass * (1 + h))
 

@@ -24,8 +24,12 @@ from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
 from stiffdice.errors import InputError
+from stiffdice.experiments import options
+from stiffdice.experiments.bisection import bisected
+from stiffdice.experiments.layout import Variable, enum, quantity
+from stiffdice.experiments.placement import level
+from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
 from stiffdice.scene.scene import Launch, Scene
@@ -88,23 +92,72 @@ def measure(
     nudge_zeta = _numbers("nudge_zeta", nudge_zeta, 0.0, 1.0)
     scan = _numbers("omega_h_relative", omega_h_relative, *_SCAN)
     steps = validation.count("steps", steps, at_least=20)
-    scenes = [_on_level_ground(scene, inertia) for inertia in INERTIAS]
-    modes = [{name: _mode(level, name) for name in _TILTS} for level in scenes]
+    grounds = [_on_level_ground(scene, inertia) for inertia in INERTIAS]
+    modes = [{name: _mode(ground, name) for name in _TILTS} for ground in grounds]
     limits = np.array([[[_limit(mode, value) for value in zeta] for mode in row.values()] for row in modes])
-    nudged = np.array(
-        [
-            [
-                [[_nudged(level, row[name], value, part, steps) for part in scan] for value in nudge_zeta]
-                for name in NUDGES.values()
+    nudged = np.empty((len(INERTIAS), len(NUDGES), len(nudge_zeta), len(scan), 2))
+    for i, ground in enumerate(grounds):
+        for k, name in enumerate(NUDGES.values()):
+            nudged[i, k] = [
+                [_nudged(ground, modes[i][name], value, part, steps) for part in scan] for value in nudge_zeta
             ]
-            for level, row in zip(scenes, modes, strict=True)
-        ]
+    attributes = dataset.provenance_attributes("Limits of the contact modes", scene, MODEL, SCHEME, __name__)
+    attributes["scene_note"] = (
+        "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
     )
-    return _dataset(scene, modes, zeta, limits, nudge_zeta, scan, nudged)
+    coordinates = {
+        "inertia": enum("inertia", INERTIAS, "moment of inertia of the cube"),
+        "mode": enum("mode", list(_TILTS), "contact mode"),
+        "nudge": enum("nudge", list(NUDGES), "nudge to a cube at rest on its face"),
+        "zeta": quantity("zeta", zeta, "damping ratio of the mode itself, (D/S) omega/2"),
+        "nudge_zeta": quantity("nudge_zeta", nudge_zeta, "damping ratio of the nudged motion"),
+        "omega_h_relative": quantity("omega_h_relative", scan, "omega h of the nudged motion over its limit by theory"),
+    }
+    unit = scene.ground.stiffness / scene.cube.mass
+    return xr.Dataset(
+        _limit_variables(modes, zeta, limits, unit) | _growth_variables(nudge_zeta, scan, nudged),
+        coordinates,
+        attributes,
+    )
+
+
+def _limit_variables(
+    modes: Sequence[Mapping[str, _Mode]], zeta: Sequence[float], limits: Array, unit: float
+) -> dict[str, Variable]:
+    """Return what was found of the linearised step; unit: S/m [rad²/s²]."""
+    grid = ("inertia", "mode", "zeta")
+    squares, predicted = (
+        np.array([[getattr(mode, name) for mode in row.values()] for row in modes]) for name in ("square", "predicted")
+    )
+    limit = limits * np.sqrt(predicted)[:, :, None]
+    theory = np.array([linear_theory.stability_limit(value) for value in zeta])
+    return {
+        "mode_number": quantity(grid[:2], squares / unit, "k of omega^2 = k S/m, as the step shows it"),
+        "mode_number_theory": quantity(grid[:2], predicted / unit, "k of omega^2 = k S/m by theory"),
+        "limit": quantity(
+            grid, limit, "omega h at which one step's spectral radius passes 1; omega of the mode by theory"
+        ),
+        "limit_theory": quantity("zeta", theory, "2 (sqrt(1 + zeta^2) - zeta)"),
+        "limit_error": quantity(grid, limit / theory - 1, "measured limit over theory, minus 1"),
+        "longest_step": quantity(grid, limits * np.sqrt(unit), "step size h at the measured limit, as h sqrt(S/m)"),
+    }
+
+
+def _growth_variables(zeta: Sequence[float], scan: Sequence[float], nudged: Array) -> dict[str, Variable]:
+    """Return what was found of nudges."""
+    grid = ("inertia", "nudge", "nudge_zeta", "omega_h_relative")
+    limits = [(value, linear_theory.stability_limit(value)) for value in zeta]
+    theory = [[linear_theory.growth(part * limit, value) for part in scan] for value, limit in limits]
+    followed = nudged[..., 1].astype(np.int32)
+    return {
+        "growth": quantity(grid, nudged[..., 0], "factor by which a nudge to the cube at rest grows in a step"),
+        "growth_theory": quantity(grid[2:], theory, "the same by theory"),
+        "steps_followed": quantity(grid, followed, "steps that show it: until a node has moved by 1 % of the sag"),
+    }
 
 
 def _numbers(key: str, values: Sequence[float], smallest: float, largest: float) -> list[float]:
-    numbers = [validation.number(key, value, "1") for value in values]
+    numbers = options.numbers(key, values, "1")
     if not numbers or min(numbers) < smallest or max(numbers) > largest:
         raise InputError(
             f"{key} = {validation.shown(values)}: allowed are numbers from {smallest:g} to {largest:g} [1]"
@@ -113,16 +166,14 @@ def _numbers(key: str, values: Sequence[float], smallest: float, largest: float)
 
 
 def _on_level_ground(scene: Scene, inertia: str) -> Scene:
-    cube = dataclasses.replace(scene.cube, inertia=inertia)
-    level = scene.with_ground(normal=(0.0, 0.0, 1.0), friction=0.0, damping=0.0, contact="gated")
-    stiffness = scene.ground.stiffness
-    lowest, highest = (part * cube.side for part in _SAGS)
+    ground = level(scene, friction=0.0, damping=0.0)
+    lowest, highest = (part * scene.cube.side for part in _SAGS)
     if not lowest <= linear_theory.sag(scene) <= highest:
         raise InputError(
-            f"ground.stiffness = {stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by m g/(4 S); "
-            f"allowed is {lowest:.3g} to {highest:.3g} [m]"
+            f"ground.stiffness = {scene.ground.stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by "
+            f"m g/(4 S); allowed is {lowest:.3g} to {highest:.3g} [m]"
         )
-    return dataclasses.replace(level, cube=cube)
+    return dataclasses.replace(ground, cube=dataclasses.replace(scene.cube, inertia=inertia))
 
 
 class _Contact(NamedTuple):
@@ -236,11 +287,7 @@ def _limit(mode: _Mode, zeta: float) -> float:
         step = inside.T @ _jacobian(mode.contact, damping, h) @ inside
         return bool(np.abs(np.linalg.eigvals(step)).max() <= 1 + _TINY)
 
-    low, high = 0.0, 2 * linear_theory.STABILITY_LIMIT / omega
-    while high - low > 1e-10 * high:
-        middle = (low + high) / 2
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
+    return bisected(stable, 0.0, 2 * linear_theory.STABILITY_LIMIT / omega, relative=1e-10)[0]
 
 
 def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> tuple[float, float]:
@@ -264,8 +311,7 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
         steps=steps,
         every=1,
     )
-    assert run.trajectory is not None
-    state, upright = run.trajectory.state, scene.cube.node_offsets()
+    state, upright = states_of(run, steps), scene.cube.node_offsets()
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
     gone = np.flatnonzero(np.abs(heights + sag).max(axis=1) > _FOLLOWED * sag)
@@ -283,68 +329,3 @@ def _growth(motion: Array) -> float:
     """
     a, b = np.linalg.lstsq(np.column_stack([motion[1:-1], -motion[:-2]]), motion[2:], rcond=None)[0]
     return float(np.abs(np.roots([1.0, -a, b])).max())
-
-
-def _dataset(
-    scene: Scene,
-    modes: Sequence[Mapping[str, _Mode]],
-    zeta: Sequence[float],
-    limits: Array,
-    nudge_zeta: Sequence[float],
-    scan: Sequence[float],
-    nudged: Array,
-) -> xr.Dataset:
-    grid, scanned = ("inertia", "mode", "zeta"), ("inertia", "nudge", "nudge_zeta", "omega_h_relative")
-    unit = scene.ground.stiffness / scene.cube.mass
-    squares, predicted = (
-        np.array([[getattr(mode, name) for mode in row.values()] for row in modes]) for name in ("square", "predicted")
-    )
-    limit = limits * np.sqrt(predicted)[:, :, None]
-    theoretical = np.array([linear_theory.stability_limit(value) for value in zeta])
-    growths = [
-        [linear_theory.growth(part * linear_theory.stability_limit(value), value) for part in scan]
-        for value in nudge_zeta
-    ]
-    variables: dict[str, Any] = {
-        name: (dims, values, {"long_name": meaning, "units": "1"})
-        for name, dims, values, meaning in (
-            ("mode_number", grid[:2], squares / unit, "k of omega^2 = k S/m, as the step shows it"),
-            ("mode_number_theory", grid[:2], predicted / unit, "k of omega^2 = k S/m by theory"),
-            ("limit", grid, limit, "omega h at which one step's spectral radius passes 1; omega of the mode by theory"),
-            ("limit_theory", ("zeta",), theoretical, "2 (sqrt(1 + zeta^2) - zeta)"),
-            ("limit_error", grid, limit / theoretical - 1, "measured limit over theory, minus 1"),
-            ("longest_step", grid, limits * np.sqrt(unit), "step size h at the measured limit, as h sqrt(S/m)"),
-            ("growth", scanned, nudged[..., 0], "factor by which a nudge to the cube at rest grows in a step"),
-            ("growth_theory", scanned[2:], growths, "the same by theory"),
-            (
-                "steps_followed",
-                scanned,
-                nudged[..., 1].astype(np.int32),
-                "steps that show it: until a node has moved by 1 % of the sag",
-            ),
-        )
-    }
-    attributes = dataset.provenance_attributes(
-        "Limits of the contact modes", scene, MODEL, SCHEME, "stiffdice.experiments.rocking"
-    )
-    attributes["scene_note"] = (
-        "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
-    )
-    return xr.Dataset(variables, _coordinates(zeta, nudge_zeta, scan), attributes)
-
-
-def _coordinates(zeta: Sequence[float], nudge_zeta: Sequence[float], scan: Sequence[float]) -> dict[str, Any]:
-    enums = (
-        ("inertia", INERTIAS, "moment of inertia of the cube"),
-        ("mode", _TILTS, "contact mode"),
-        ("nudge", NUDGES, "nudge to a cube at rest on its face"),
-    )
-    numbers = (
-        ("zeta", zeta, "damping ratio of the mode itself, (D/S) omega/2"),
-        ("nudge_zeta", nudge_zeta, "damping ratio of the nudged motion"),
-        ("omega_h_relative", scan, "omega h of the nudged motion over its limit by theory"),
-    )
-    return {
-        name: (name, np.arange(len(meanings), dtype=np.int8), enum_attributes(text, list(meanings)))
-        for name, meanings, text in enums
-    } | {name: (name, values, {"long_name": text, "units": "1"}) for name, values, text in numbers}

@@ -9,11 +9,12 @@ import gc
 import math
 import os
 import platform
+import re
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -86,22 +87,17 @@ def machine() -> dict[str, Any]:
         "machine_cores": os.cpu_count() or 0,
         "machine_load_1_minute": round(os.getloadavg()[0], 2),
         "machine_system": platform.platform(),
-        "versions": "; ".join([f"python {sys.version.split()[0]}", *filter(None, map(_told, _PACKAGES))]),
+        "versions": "; ".join(
+            [f"python {sys.version.split()[0]}", *(f"{package} {version(package)}" for package in _PACKAGES)]
+        ),
         "measured_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     }
 
 
 def _processor() -> str:
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
-
-
-def _told(package: str) -> str:
-    try:
-        return f"{package} {version(package)}"
-    except PackageNotFoundError:
-        return ""
+        text = ""
+    name = re.search(r"^model name\s*: *(.+?) *$", text, re.MULTILINE)
+    return name[1] if name else platform.machine()

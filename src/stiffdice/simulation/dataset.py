@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from typing import Any
@@ -20,7 +20,6 @@ from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
@@ -50,20 +49,6 @@ CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
     "contact": CONTACT_ATTRIBUTES,
     **{name: schema.attributes_of("shard", name) for name in ("stiffness", "steps", "omega_h")},
 }
-# Of what every method spent on one ground after another.
-EFFORT_DIMENSIONS = ("stiffness", "method", "effort")
-EFFORT_ATTRIBUTES: dict[str, dict[str, Any]] = {
-    "steps": {"long_name": "number of time steps, 0 where the method takes its own", "units": "1"},
-    "tolerance": {"long_name": "tolerance of a method that controls its own error", "units": "1"},
-}
-
-
-def method_coordinates(stiffness: Sequence[float], methods: Sequence[str]) -> dict[str, Any]:
-    """Return the coordinates of what every method did on grounds of these stiffnesses [kg/s²]."""
-    return {
-        "stiffness": ("stiffness", list(stiffness), CELL_ATTRIBUTES["stiffness"]),
-        "method": ("method", np.arange(len(methods), dtype=np.int8), enum_attributes("method", list(methods))),
-    }
 
 
 def criteria_text(tolerances: Mapping[str, float]) -> str:

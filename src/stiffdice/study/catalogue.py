@@ -95,7 +95,7 @@ EXPERIMENTS: dict[str, Entry] = {
     "failure-map": Entry("stiffdice.experiments.failure_map", "measure"),
     "friction-chatter": Entry("stiffdice.experiments.friction_chatter", "measure"),
     "precision-limits": Entry("stiffdice.experiments.precision_limits", "measure"),
-    "model-ablation": Entry("stiffdice.experiments.model_ablation", "measure"),
+    "model-ablation": Entry("stiffdice.experiments.model_ablation.measure", "measure"),
     "held-contacts": Entry("stiffdice.experiments.held_contacts", "measure"),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
     "engine-contact": Entry("stiffdice.experiments.engines.contact", "measure"),
@@ -106,7 +106,7 @@ EXPERIMENTS: dict[str, Entry] = {
 # (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.
 TIMINGS: dict[str, Entry] = {
     "work-precision": Entry("stiffdice.experiments.work_precision.time", "time"),
-    "model-ablation": Entry("stiffdice.experiments.model_ablation", "time"),
+    "model-ablation": Entry("stiffdice.experiments.model_ablation.time", "time"),
     "engine-speed": Entry("stiffdice.experiments.engines.speed", "time"),
 }
 

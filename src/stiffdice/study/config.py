@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,17 +14,15 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.state import TURNING, start_of
 from stiffdice.errors import InputError, NotInstalledError, printable
-from stiffdice.integrators import registry as schemes
 from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
-from stiffdice.scene.ground import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.initial_conditions import phased, turned
-from stiffdice.study import catalogue
-from stiffdice.sweep.grid import Spans, Sweep
+from stiffdice.study import catalogue, schema_check
+from stiffdice.sweep.grid import Sweep
 
 # In units of the side: nodes that are this level land at once, as far as their restitution shows.
 _FLAT = 1e-9
@@ -110,26 +107,31 @@ def load(path: str | Path, schema: str | Path) -> Study:
     if not Path(path).exists():
         raise InputError(_missing(Path(path)))
     data = yaml_loader.load(path)
-    _validate(data, schema, str(path))
+    schema_check.check(data, schema, str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
         left_out: list[str] = []
         parts = {
             "runs": _installed(data, "runs", _planned_run, left_out),
-            "sweeps": _installed(data, "sweeps", partial(_sweep, criteria=data.get("criteria")), left_out),
-            "experiments": _installed(data, "experiments", partial(_experiment, "experiments", left_out), left_out),
-            "timings": _installed(data, "timings", partial(_experiment, "timings", left_out), left_out),
+            "sweeps": _installed(data, "sweeps", partial(_sweep, data.get("criteria")), left_out),
+            "experiments": _installed(data, "experiments", partial(_experiment, catalogue.EXPERIMENTS), left_out),
+            "timings": _installed(data, "timings", partial(_experiment, catalogue.TIMINGS), left_out),
         }
-        figures = {
-            name: _planned_figure(name, part, data, parts["runs"]) for name, part in data.get("figures", {}).items()
+        shown = {
+            kind: {
+                name: _planned_figure(f"{kind}.{name}", registry, part, data)
+                for name, part in data.get(kind, {}).items()
+            }
+            for kind, registry in (("figures", catalogue.DRAWINGS), ("tables", catalogue.TABLES))
         }
-        tables = {name: _planned_table(name, part, data) for name, part in data.get("tables", {}).items()}
+        for name, figure in shown["figures"].items():
+            _check_turns(f"figures.{name}", figure, parts["runs"])
         return Study(
             name=Path(path).stem,
             question=data["question"],
             **parts,
-            figures=_shown("figures", figures, catalogue.DRAWINGS, parts, left_out),
-            tables=_shown("tables", tables, catalogue.TABLES, parts, left_out),
+            figures=_shown("figures", shown["figures"], catalogue.DRAWINGS, parts, left_out),
+            tables=_shown("tables", shown["tables"], catalogue.TABLES, parts, left_out),
             dpi=int(data.get("dpi", 150)),
             left_out=tuple(left_out),
         )
@@ -145,15 +147,19 @@ def _missing(path: Path) -> str:
 
 
 def _installed(
-    data: Mapping[str, Any], kind: str, plan: Callable[[str, Any], Any], left_out: list[str]
+    data: Mapping[str, Any], kind: str, plan: Callable[[Any, list[NotInstalledError]], Any], left_out: list[str]
 ) -> dict[str, Any]:
     """Return the parts of one kind that a study names, planned, without those that need what is not installed."""
     planned = {}
     for name, part in data.get(kind, {}).items():
+        missing: list[NotInstalledError] = []
         try:
-            planned[name] = plan(name, part)
+            planned[name] = plan(part, missing)
         except NotInstalledError as error:
-            left_out.append(f"left out: {error}")
+            missing.append(error)
+        except InputError as error:
+            raise error.within(f"{kind}.{name}") from None
+        left_out += [f"left out: {error.within(f'{kind}.{name}')}" for error in missing]
     return planned
 
 
@@ -177,96 +183,14 @@ def _shown(
     return shown
 
 
-def _validate(data: object, schema: str | Path, source: str) -> None:
-    import jsonschema
-
-    _refuse_nan(data, "", source)
-    validator = jsonschema.Draft202012Validator(_filled(yaml_loader.load(schema)))
-    errors = sorted(validator.iter_errors(data), key=_rank)
-    if errors:
-        raise InputError(f"{source}: {_told(_innermost(errors[0]))}")
-
-
-def _filled(schema: Any) -> Any:
-    """Return a study's schema with the names that its file leaves to the code."""
-    known = {
-        "model": model_selection.CHOICES,
-        "scheme": schemes.SCHEMES,
-        "simulator": (backend.OURS, *engines.ENGINES),
-        "contact_law": CONTACT_LAWS,
-    }
-    for kind, names in known.items():
-        schema["$defs"][kind] = {"enum": list(names), "errorMessage": f"allowed is {' or '.join(names)}"}
-    return schema
-
-
-def _refuse_nan(data: object, where: str, source: str) -> None:
-    """Raise InputError if a number is not one: no bound of a schema stops a NaN."""
-    if isinstance(data, float) and math.isnan(data):
-        raise InputError(f"{source}: {where[1:]} = nan: allowed is a finite number")
-    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    for key, part in parts:
-        _refuse_nan(part, f"{where}.{key}", source)
-
-
-# A misspelt key is told before the key that it leaves missing.
-_RANK = {"additionalProperties": 0, "required": 2, "oneOf": 3}
-
-
-def _rank(error: Any) -> int:
-    return _RANK.get(str(error.validator), 1)
-
-
-def _innermost(error: Any) -> Any:
-    """Return what is wrong within a value that may be of several kinds, if it is of one of them."""
-    if error.validator != "anyOf":
-        return error
-    others = {part.relative_schema_path[0] for part in error.context if part.validator == "type" and not part.path}
-    for part in sorted(error.context, key=_rank):
-        inner = _innermost(part)
-        if part.relative_schema_path[0] not in others and inner.validator != "anyOf":
-            return inner
-    return error
-
-
-def _told(error: Any) -> str:
-    """Return a schema error as one line that names the key, its value and what is allowed."""
-    where = ".".join(str(part) for part in error.absolute_path)
-    try:
-        if error.validator == "additionalProperties":
-            validation.known_keys(where, error.instance, list(error.schema["properties"]))
-    except InputError as unknown:
-        return str(unknown)
-    if error.validator == "required":
-        missing = [key for key in error.validator_value if key not in error.instance]
-        return f"{where + '.' if where else ''}{missing[0]} is missing"
-    allowed = error.schema.get("errorMessage")
-    if error.validator == "enum" and allowed:
-        allowed += validation.meant(error.instance, error.validator_value)
-    if error.validator == "oneOf":
-        return f"{where}: {allowed}"
-    if "propertyNames" in error.absolute_schema_path:
-        return f"{where}.{error.instance}: allowed names have small letters, digits and hyphens"
-    return f"{where or 'the file'} = {validation.shown(error.instance)}: {allowed or error.message}"
-
-
-def _planned_run(name: str, run: Mapping[str, Any]) -> PlannedRun:
+def _planned_run(run: Mapping[str, Any], _missing: object) -> PlannedRun:
     steps, every, simulator = int(run["steps"]), int(run.get("every", 1)), run.get("simulator", backend.OURS)
     if every > steps:
-        raise InputError(f"runs.{name}.every = {every}: allowed is a whole number <= steps = {steps}")
-    try:
-        planned = PlannedRun(
-            run["scene"],
-            tuple(run.get("presets", ("as_listed", "as_written"))),
-            run["model"],
-            simulator,
-            backend.scheme_of(simulator, run.get("scheme")),
-            steps,
-            every,
-        )
-        _models_of(planned)
-    except InputError as error:
-        raise error.within(f"runs.{name}") from None
+        raise InputError(f"every = {every}: allowed is a whole number <= steps = {steps}")
+    presets = tuple(run.get("presets", ("as_listed", "as_written")))
+    scheme = backend.scheme_of(simulator, run.get("scheme"))
+    planned = PlannedRun(run["scene"], presets, run["model"], simulator, scheme, steps, every)
+    _models_of(planned)
     return planned
 
 
@@ -283,48 +207,26 @@ def _models_of(run: PlannedRun) -> set[str]:
 
 
 def _planned_figure(
-    name: str, figure: Mapping[str, Any], data: Mapping[str, Any], runs: Mapping[str, PlannedRun]
+    where: str, registry: Mapping[str, catalogue.Entry], part: Mapping[str, Any], data: Mapping[str, Any]
 ) -> PlannedFigure:
-    planned = PlannedFigure(
-        figure["draw"],
-        figure.get("run"),
-        tuple(figure.get("of", ())),
-        figure["title"],
-        tuple(figure.get("timings", ())),
-    )
-    validation.choice(f"figures.{name}.draw", planned.draw, catalogue.DRAWINGS)
-    drawing = catalogue.DRAWINGS[planned.draw]
-    if drawing.given != "runs":
-        if planned.run is not None:
-            raise InputError(
-                f"figures.{name}.run = {planned.run}: {planned.draw} draws {drawing.given}; name them with `of`"
-            )
-        return _checked_sources(f"figures.{name}", planned, drawing, data)
-    if planned.of or planned.timings:
-        raise InputError(
-            f"figures.{name}.{'of' if planned.of else 'timings'}: {planned.draw} draws a run; name it with `run`"
-        )
-    run = runs.get(_known(f"figures.{name}.run", planned.run, data.get("runs", {}), "runs"))
-    if run and planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
-        raise InputError(f"figures.{name}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
-    return planned
-
-
-def _planned_table(name: str, table: Mapping[str, Any], data: Mapping[str, Any]) -> PlannedFigure:
-    planned = PlannedFigure(table["tell"], None, tuple(table["of"]), table["title"], tuple(table.get("timings", ())))
-    validation.choice(f"tables.{name}.tell", planned.draw, catalogue.TABLES)
-    return _checked_sources(f"tables.{name}", planned, catalogue.TABLES[planned.draw], data)
-
-
-def _checked_sources(
-    where: str, planned: PlannedFigure, entry: catalogue.Entry, data: Mapping[str, Any]
-) -> PlannedFigure:
-    """Return the plan; raises InputError unless it names sweeps, experiments or timings that the study has."""
-    if not planned.of:
+    """Return the plan of a figure or a table; raises InputError unless the study has what it names."""
+    word = "draw" if "draw" in part else "tell"
+    of, timings = tuple(part.get("of", ())), tuple(part.get("timings", ()))
+    planned = PlannedFigure(part[word], part.get("run"), of, part["title"], timings)
+    validation.choice(f"{where}.{word}", planned.draw, registry)
+    entry = registry[planned.draw]
+    if entry.given == "runs":
+        if of or timings:
+            raise InputError(f"{where}.{'of' if of else 'timings'}: {planned.draw} draws a run; name it with `run`")
+        _known(f"{where}.run", planned.run, data.get("runs", {}), "runs")
+        return planned
+    if planned.run is not None:
+        raise InputError(f"{where}.run = {planned.run}: {planned.draw} draws {entry.given}; name them with `of`")
+    if not of:
         raise InputError(f"{where}.of is missing: {planned.draw} needs the names of {entry.given}")
-    if planned.timings and not entry.timed:
+    if timings and not entry.timed:
         raise InputError(f"{where}.timings: {planned.draw} shows none")
-    for key, kind, names in (("of", entry.given, planned.of), ("timings", "timings", planned.timings)):
+    for key, kind, names in (("of", entry.given, of), ("timings", "timings", timings)):
         for source in names:
             _known(f"{where}.{key}", source, data.get(kind, {}), kind)
             if entry.measures and data[kind][source]["measure"] != entry.measures:
@@ -334,51 +236,49 @@ def _checked_sources(
     return planned
 
 
-def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> str:
-    """Return a name if there is one such thing in the study; raises InputError otherwise."""
+def _check_turns(where: str, planned: PlannedFigure, runs: Mapping[str, PlannedRun]) -> None:
+    """Raise InputError if a figure shows how a cube turns in a run that has no turning."""
+    run = runs.get(planned.run or "")
+    if run and planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
+        raise InputError(f"{where}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
+
+
+def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> None:
+    """Raise InputError unless there is one such thing in the study."""
     if name is None or name not in names:
         allowed = " or ".join(names) or f"none: this study has no {kind}"
         raise InputError(f"{where} = {validation.shown(name)}: allowed is {allowed}{validation.meant(name, names)}")
-    return name
 
 
-def _experiment(kind: str, left_out: list[str], name: str, experiment: Mapping[str, Any]) -> Experiment:
-    """Return the plan, its methods without those that are not installed."""
-    registry = {"experiments": catalogue.EXPERIMENTS, "timings": catalogue.TIMINGS}[kind]
-    planned = Experiment(
-        experiment["measure"],
-        experiment["scene"],
-        tuple(experiment.get("set", ())),
-        dict(experiment.get("options", {})),
-    )
-    try:
-        validation.choice("measure", planned.measure, registry)
-        scene = scenes.load(planned.scene, planned.changes)
-        _refuse_restitution(scene, f"{kind} may take others")
-        parameters = inspect.signature(registry[planned.measure].load()).parameters.values()
-        known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
-        validation.known_keys("options", planned.options, known)
-        for key, value in planned.options.items():
-            _same_kind(f"options.{key}", value, known[key])
-        if "methods" in planned.options:
-            planned.options["methods"] = _installed_of(planned.options["methods"], f"{kind}.{name}", left_out)
-    except InputError as error:
-        raise error.within(f"{kind}.{name}") from None
-    return planned
+def _experiment(
+    registry: Mapping[str, catalogue.Entry], experiment: Mapping[str, Any], missing: list[NotInstalledError]
+) -> Experiment:
+    """Return the plan, its methods without those that are not installed; `missing` gets an error for each."""
+    measure, changes = experiment["measure"], tuple(experiment.get("set", ()))
+    options = dict(experiment.get("options", {}))
+    validation.choice("measure", measure, registry)
+    _refuse_restitution(scenes.load(experiment["scene"], changes), "an experiment may take others")
+    parameters = inspect.signature(registry[measure].load()).parameters.values()
+    known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
+    validation.known_keys("options", options, known)
+    for key, value in options.items():
+        _same_kind(f"options.{key}", value, known[key])
+    if "methods" in options:
+        options["methods"] = _installed_of(options["methods"], missing)
+    return Experiment(measure, experiment["scene"], changes, options)
 
 
-def _installed_of(methods: Sequence[str], where: str, left_out: list[str]) -> list[str]:
+def _installed_of(methods: Sequence[str], missing: list[NotInstalledError]) -> list[str]:
     """Return the methods without engines that are not installed; raises NotInstalledError if none is left."""
-    found, last = [], None
+    found = []
     for method in methods:
         try:
             if method in engines.ENGINES:
                 engines.adapter_of(method, "methods")
             found.append(method)
         except NotInstalledError as error:
-            last = error
-            left_out.append(f"left out: {error.within(where)}")
-    if last is not None and not found:
+            missing.append(error)
+    if missing and not found:
         raise NotInstalledError("methods: none of them is left")
     return found
 
@@ -401,14 +301,8 @@ def _same_kind(key: str, value: object, default: Any) -> None:
             validation.number(key, part, "", at_least=0)
 
 
-def _sweep(name: str, sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
-    try:
-        return _checked_sweep(sweep, sweep.get("criteria", criteria))
-    except InputError as error:
-        raise error.within(f"sweeps.{name}") from None
-
-
-def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | None) -> Sweep:
+def _sweep(given_criteria: Mapping[str, float] | None, sweep: Mapping[str, Any], _missing: object) -> Sweep:
+    criteria = sweep.get("criteria", given_criteria)
     scene = scenes.load(sweep["scene"], sweep.get("set", ()))
     stiffness, simulator = sweep["stiffness"], sweep.get("simulator", backend.OURS)
     asked = Sweep(
@@ -438,7 +332,9 @@ def _checked_sweep(sweep: Mapping[str, Any], criteria: Mapping[str, float] | Non
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
     if planned.horizon > scene.duration:
         raise InputError(f"horizon = {planned.horizon:g}: allowed is a number <= duration = {scene.duration:g} [s]")
-    _refuse_descending(planned.stiffness)
+    for span in [planned.stiffness] if isinstance(planned.stiffness, Mapping) else planned.stiffness:
+        if span["from"] > span["to"]:
+            raise InputError(f"stiffness.from = {span['from']:g}: allowed is a number <= to = {span['to']:g} [kg/s²]")
     if any(column != (scene.ground.contact, scene.ground.stiffness) for column in planned.columns()):
         _refuse_restitution(scene, "the sweep sets others")
     for key in ("stiffness", "contact"):
@@ -464,12 +360,6 @@ def _refuse_restitution(scene: scenes.Scene, reason: str) -> None:
             f"scene: its ground.restitution is that of stiffness {scene.ground.stiffness:g} kg/s² and the "
             f"{scene.ground.contact} law alone, and {reason}; give ground.damping"
         )
-
-
-def _refuse_descending(stiffness: Spans) -> None:
-    for span in [stiffness] if isinstance(stiffness, Mapping) else stiffness:
-        if span["from"] > span["to"]:
-            raise InputError(f"stiffness.from = {span['from']:g}: allowed is a number <= to = {span['to']:g} [kg/s²]")
 
 
 def _model_of(sweep: Sweep) -> tuple[str, str]:

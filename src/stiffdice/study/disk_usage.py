@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 from collections.abc import Collection, Iterator
@@ -81,15 +82,9 @@ def _kind(path: str) -> str:
     return "other"
 
 
-def _files(folder: Path, inside: str = "") -> Iterator[tuple[str, int]]:
+def _files(folder: Path) -> Iterator[tuple[str, int]]:
     """Yield every file in a folder with its size, links not followed; what vanishes meanwhile is left out."""
-    try:
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                path = f"{inside}{entry.name}"
-                if entry.is_dir(follow_symlinks=False):
-                    yield from _files(Path(entry.path), f"{path}/")
-                else:
-                    yield path, entry.stat(follow_symlinks=False).st_size
-    except OSError:
-        return
+    for top, _, names in os.walk(folder):
+        for path in (Path(top, name) for name in names):
+            with contextlib.suppress(OSError):
+                yield path.relative_to(folder).as_posix(), path.lstat().st_size

@@ -28,13 +28,13 @@ _DIGITS = 16
 # Of each stage the script, and the modules that it stands on besides those that the plan names.
 _WRITES, _READS = "stiffdice.io.writer", "stiffdice.io.reader"
 _MEASURE = ("measure.py", "stiffdice.simulation.dataset", _WRITES)
-_COLLECT = ("collect.py", "stiffdice.sweep.sweep", "stiffdice.sweep.partition", _READS, _WRITES)
+_COLLECT = ("collect.py", "stiffdice.sweep.collect", "stiffdice.sweep.partition", _READS, _WRITES)
 _DRAW = ("figure.py", "stiffdice.report.figures.registry", _READS)
 _CODE = {
     "trajectory": ("trajectory.py", "stiffdice.simulation.dataset", "stiffdice.simulation.energy_budget", _WRITES),
     "experiment": _MEASURE,
     "timings": _MEASURE,
-    "shard": ("shard.py", "stiffdice.sweep.sweep"),
+    "shard": ("shard.py", "stiffdice.sweep.shard"),
     "survey": _COLLECT,
     "collect": _COLLECT,
     "frontier": ("frontier.py", "stiffdice.sweep.stability_limits", _READS, _WRITES),

@@ -94,11 +94,10 @@ class Sweep:
         return min(first for first, _ in ranges), max(last for _, last in ranges)
 
     def _range_of(self, span: Span, stiffness: float) -> tuple[float, float]:
-        ends = span
+        first, last = float(span["from"]), float(span["to"])  # NumPy has no whole numbers above 2^63
         if self.steps is None:
-            scene = self.scene.with_ground(stiffness=stiffness)
-            ends = {end: linear_theory.steps_for(scene, span[end]) for end in ("from", "to")}
-        first, last = float(ends["from"]), float(ends["to"])  # NumPy has no whole numbers above 2^63
+            radians = linear_theory.contact_frequency(stiffness, self.scene.cube.mass) * self.scene.duration
+            first, last = radians / first, radians / last
         return min(first, last), max(first, last)
 
     def scan(self, column: Column) -> list[int]:

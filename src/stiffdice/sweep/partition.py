@@ -14,9 +14,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise
+from itertools import groupby, pairwise
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -52,20 +52,17 @@ class Shard(NamedTuple):
 
 @lru_cache(maxsize=64)
 def of(sweep: Sweep) -> Mapping[str, Shard]:
-    """Return the shards of all rounds by their ids: digests of all that their numbers depend on but the code.
-
-    Kept, as half a millisecond for each column is a minute for 10⁵.
-    """
+    """Return the shards of all rounds by their ids: digests of all that their numbers depend on but the code."""
     first = scan(sweep)
-    prices = [costs(sweep, piece) for piece in first]
-    total = math.fsum(float(seconds.sum()) for seconds in prices)
+    costs = cost_model.of(sweep, first)
+    total = float(np.cumsum(costs)[-1])
     work = sweep.seconds_per_job or max(FEWEST_SECONDS, min(SECONDS, total / JOBS))
-    cut = list(_cut_at_multiples(first, prices, work))
+    cut = _cut_at_multiples(first, costs, work)
     shards = {}
     for part, (pieces, seconds) in enumerate(cut):
         shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, len(cut), seconds, pieces)
     columns = [piece.column for piece in first]
-    expected, most = _FIRST_REFINEMENT * total, sum(len(piece.steps) for piece in first)
+    expected, most = _FIRST_REFINEMENT * total, len(costs)
     for number in range(1, sweep.refine + 1):
         parts = max(1, min(math.ceil(expected / work), most))  # a round has fewer cells than those before it
         for part in range(parts):
@@ -110,66 +107,42 @@ def later(sweep: Sweep, survey: xr.Dataset, number: int, parts: int) -> list[tup
 
 def share(sweep: Sweep, pieces: Sequence[Piece], parts: int) -> list[tuple[Piece, ...]]:
     """Return the pieces cut into so many parts of equal predicted cost; some may be empty."""
-    prices = [costs(sweep, piece) for piece in pieces]
-    total = math.fsum(float(seconds.sum()) for seconds in prices)
-    found: list[tuple[Piece, ...]] = [()] * parts
-    before = 0.0
-    for piece, seconds in zip(pieces, prices, strict=True):
-        reached = before + np.cumsum(seconds)
-        middles = reached - seconds / 2
-        numbers = np.minimum((middles / total * parts).astype(np.int64), parts - 1)
-        for number, part in _runs_of(piece, numbers):
-            found[number] = (*found[number], part)
-        before = float(reached[-1])
-    return found
+    costs = cost_model.of(sweep, pieces)
+    reached = np.cumsum(costs)
+    numbers = ((reached - costs / 2) / reached[-1:] * parts).astype(np.int64)
+    return _dealt(pieces, np.minimum(numbers, parts - 1), parts)
 
 
-def costs(sweep: Sweep, piece: Piece) -> Array:
-    """Return the predicted work of each cell of a piece [s]."""
-    return cost_model.of_scan(
-        sweep.scene_of(piece.column),
-        model=sweep.model,
-        scheme=sweep.scheme,
-        simulator=sweep.simulator,
-        steps=piece.steps,
-        members=sweep.members,
-        criteria=sweep.criteria,
-        early_stop=sweep.early_stop,
-        horizon=sweep.horizon,
-    )
-
-
-def _cut_at_multiples(
-    pieces: Sequence[Piece], prices: Sequence[Array], work: float
-) -> Iterator[tuple[tuple[Piece, ...], float]]:
-    """Yield pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done.
+def _cut_at_multiples(pieces: Sequence[Piece], costs: Array, work: float) -> list[tuple[tuple[Piece, ...], float]]:
+    """Return pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done.
 
     What is left at the end of a law, if it is less than half of that, is done with the part before.
     """
-    totals: dict[str, float] = {}
-    for piece, each in zip(pieces, prices, strict=True):
-        totals[piece.column.contact] = totals.get(piece.column.contact, 0.0) + float(each.sum())
-    parts: dict[tuple[str, int], tuple[list[Piece], list[float]]] = {}
-    before = dict.fromkeys(totals, 0.0)
-    for piece, each in zip(pieces, prices, strict=True):
-        law = piece.column.contact
-        reached = before[law] + np.cumsum(each)
-        last = max(0, int(totals[law] / work + 0.5) - 1)
-        numbers = np.minimum(((reached - each / 2) / work).astype(np.int64), last)
-        for number, part in _runs_of(piece, numbers):
-            held, taken = parts.setdefault((law, number), ([], []))
-            held.append(part)
-            taken.append(float(each[numbers == number].sum()))
-        before[law] = float(reached[-1])
-    for held, taken in parts.values():
-        yield tuple(held), math.fsum(taken)
+    found, start = list[tuple[tuple[Piece, ...], float]](), 0
+    for _, of_law in groupby(pieces, lambda piece: piece.column.contact):
+        here = list(of_law)
+        end = start + sum(len(piece.steps) for piece in here)
+        seconds, start = costs[start:end], end
+        reached = np.cumsum(seconds)
+        last = max(0.0, np.floor(reached[-1] / work + 0.5) - 1)
+        multiples = np.fmin(np.floor((reached - seconds / 2) / work), last)
+        _, numbers = np.unique(multiples, return_inverse=True)  # as many parts as cells, however dear these are
+        parts = int(numbers[-1]) + 1
+        found += zip(_dealt(here, numbers, parts), np.bincount(numbers, seconds).tolist(), strict=True)
+    return found
 
 
-def _runs_of(piece: Piece, numbers: npt.NDArray[np.int64]) -> Iterator[tuple[int, Piece]]:
-    """Yield a piece cut where its cells' numbers, ascending, change, each part with its number."""
-    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(piece.steps)]
-    for start, end in pairwise(edges):
-        yield int(numbers[start]), Piece(piece.column, piece.steps[start:end])
+def _dealt(pieces: Sequence[Piece], numbers: npt.NDArray[np.int64], parts: int) -> list[tuple[Piece, ...]]:
+    """Return the pieces of each part; numbers: the part of each cell, ascending. A column may be cut."""
+    found: list[list[Piece]] = [[] for _ in range(parts)]
+    start = 0
+    for column, steps in pieces:
+        here = numbers[start : start + len(steps)]
+        start += len(steps)
+        edges = [0, *(np.flatnonzero(np.diff(here)) + 1).tolist(), len(steps)]
+        for first, end in pairwise(edges):
+            found[here[first]].append(Piece(column, steps[first:end]))
+    return [tuple(part) for part in found]
 
 
 def _digest(sweep: Sweep, config: dict[str, Any], plan: Sequence[Any]) -> str:

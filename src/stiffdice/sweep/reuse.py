@@ -19,8 +19,8 @@ from stiffdice.errors import InputError
 from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
-from stiffdice.sweep import sweep
 from stiffdice.sweep.grid import Column, Piece, Sweep
+from stiffdice.sweep.shard import shard_pattern
 
 Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], steps
 
@@ -47,7 +47,7 @@ class Kept:
         wanted = {_cell(column, n) for column, steps in pieces for n in steps}
         elsewhere = _elsewhere(folder.parent / "shards.csv", pieces)
         self._places: dict[Cell, tuple[Path, int]] = {}
-        like = sweep.pattern(plan)
+        like = shard_pattern(plan)
         for path in sorted(folder.glob("*.h5")):
             if path.stem in planned or path.stem in elsewhere:
                 continue

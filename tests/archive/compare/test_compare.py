@@ -27,7 +27,9 @@ from stiffdice.io.writer import write_dataset
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
-from stiffdice.sweep import stability_limits, sweep
+from stiffdice.sweep import stability_limits
+from stiffdice.sweep.collect import collect
+from stiffdice.sweep.shard import compute_shard
 
 NUMBERS = st.floats(width=64, allow_nan=False)
 
@@ -427,8 +429,8 @@ def test_verdicts_that_changed_are_told_in_the_fields_words(results):
 
 
 def test_edges_that_moved_are_told_by_law_and_stiffness(tmp_path, small):
-    sweep.compute(small, rounds.scan(small), tmp_path / "shard.h5")
-    found = stability_limits.find(sweep.collect(parts(tmp_path / "shard.h5"), small.criteria))
+    compute_shard(small, rounds.scan(small), tmp_path / "shard.h5")
+    found = stability_limits.find(collect(parts(tmp_path / "shard.h5"), small.criteria))
     place = tuple(np.argwhere(np.isfinite(found["steps_needed"].values))[0])
     moved = found.copy(deep=True)
     moved["steps_needed"].values[place] += 3

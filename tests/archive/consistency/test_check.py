@@ -15,7 +15,9 @@ from stiffdice.simulation import energy_budget
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import simulate
-from stiffdice.sweep import stability_limits, sweep
+from stiffdice.sweep import stability_limits
+from stiffdice.sweep.collect import collect
+from stiffdice.sweep.shard import compute_shard
 
 BOUNCING = {
     "ground": {"contact": "gated", "stiffness": 2e3, "damping": 0.3, "friction": 0.2},
@@ -59,7 +61,7 @@ def shard(small, request, tmp_path_factory):
     """The runs of that sweep, ended early or not."""
     path = tmp_path_factory.mktemp("shard") / "x.h5"
     planned = dataclasses.replace(small, early_stop=request.param)
-    sweep.compute(planned, rounds.scan(planned), path)
+    compute_shard(planned, rounds.scan(planned), path)
     return open_file(path)
 
 
@@ -67,8 +69,8 @@ def shard(small, request, tmp_path_factory):
 def whole(small, tmp_path_factory):
     """That sweep, judged."""
     path = tmp_path_factory.mktemp("whole") / "x.h5"
-    sweep.compute(small, rounds.scan(small), path)
-    return sweep.collect(parts(path, 7), small.criteria)
+    compute_shard(small, rounds.scan(small), path)
+    return collect(parts(path, 7), small.criteria)
 
 
 def changed(dataset, name, place, change):

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.experiments import model_ablation
+from stiffdice.experiments.model_ablation.measure import measure
+from stiffdice.experiments.model_ablation.time import time
 from stiffdice.report.figures import model_ablation as drawing
 from stiffdice.report.figures import style
 from stiffdice.scene.scene import Scene
@@ -13,7 +14,7 @@ pytestmark = pytest.mark.long
 
 @pytest.fixture(scope="module")
 def dataset():
-    return model_ablation.measure(Scene(), stiffness=(1e3, 1e4), friction=(0.0, 0.01, 0.15), horizon=3.3)
+    return measure(Scene(), stiffness=(1e3, 1e4), friction=(0.0, 0.01, 0.15), horizon=3.3)
 
 
 def test_errors_partings_and_spins_are_drawn_for_each_law_and_friction(dataset):
@@ -36,7 +37,7 @@ def test_errors_partings_and_spins_are_drawn_for_each_law_and_friction(dataset):
 
 
 def test_times_are_drawn_as_ratios():
-    timed = model_ablation.time(Scene().with_ground(contact="gated"), steps=300, rounds=2)
+    timed = time(Scene().with_ground(contact="gated"), steps=300, rounds=2)
     with style.applied():
         (panel,) = drawing.draw_times({"gated": timed}, "A title").axes
     assert panel.get_xlabel().endswith("[1]")

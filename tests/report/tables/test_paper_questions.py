@@ -33,7 +33,7 @@ def frontier(stiffness, steps, failing, criterion="apex"):
         },
         {name: ("cell", values, dataset.CELL_ATTRIBUTES[name]) for name, values in cells.items()}
         | {"criterion": ("criterion", np.zeros(1, np.int8), enum_attributes("criterion", [criterion]))},
-        dataset.provenance_attributes("A scan", Scene(), "sliding", "symplectic_euler", "stiffdice.sweep.sweep")
+        dataset.provenance_attributes("A scan", Scene(), "sliding", "symplectic_euler", "stiffdice.sweep.shard")
         | {"members": MEMBERS},
     )
     return find(sweep)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from stiffdice.experiments import layout
 from stiffdice.report.tables.work_precision import cost_of, found_in, table, targets
-from stiffdice.simulation import dataset
 
 COSTS = np.array([1e2, 1e3, 1e4, 1e5, 1e6])
 
@@ -73,15 +73,15 @@ def made(problem, methods, tolerance, errors, evaluations, seconds):
     shape = np.shape(errors)
     grounds = list(np.geomspace(1e2, 1e12, shape[0]))
     tried = {
-        "steps": (dataset.EFFORT_DIMENSIONS, np.full(shape, 12)),
-        "tolerance": (dataset.EFFORT_DIMENSIONS, np.broadcast_to(tolerance, shape)),
+        "steps": (layout.EFFORT_GRID, np.full(shape, 12)),
+        "tolerance": (layout.EFFORT_GRID, np.broadcast_to(tolerance, shape)),
     }
-    coordinates = dataset.method_coordinates(grounds, methods)
+    coordinates = {"stiffness": layout.of_cells("stiffness", grounds), "method": layout.method_axis(methods)}
     found = {"evaluations": evaluations, "position_error": errors}
-    variables = {name: (dataset.EFFORT_DIMENSIONS, np.array(values, float)) for name, values in found.items()}
+    variables = {name: (layout.EFFORT_GRID, np.array(values, float)) for name, values in found.items()}
     times = {
-        "seconds": (dataset.EFFORT_DIMENSIONS, np.array(seconds, float)),
-        "seconds_per_step": (dataset.EFFORT_DIMENSIONS[:2], np.full(shape[:2], np.nan)),
+        "seconds": (layout.EFFORT_GRID, np.array(seconds, float)),
+        "seconds_per_step": (layout.EFFORT_GRID[:2], np.full(shape[:2], np.nan)),
     }
     attributes = {"problem": problem}
     return {

@@ -5,13 +5,13 @@ import pytest
 
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.engines.single_bounce import level
+from stiffdice.experiments.engines.single_bounce import flat
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.run import simulate
 
-SCENE = level(Scene(), friction=0.0)
+SCENE = flat(Scene(), friction=0.0)
 
 
 def test_a_scheme_makes_the_run_that_simulate_makes_however_it_is_cut():

@@ -7,21 +7,21 @@ and leaves the bounce as it is.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import flat_bounce, linear_theory
-from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.errors import InputError
+from stiffdice.experiments import options
 from stiffdice.experiments.engines.limits import METHODS
-from stiffdice.experiments.engines.single_bounce import MODEL, bounce, landing_speed, level
+from stiffdice.experiments.engines.single_bounce import MODEL, bounce, flat, heights_at_rest
+from stiffdice.experiments.layout import method_axis, of_cells, quantity
+from stiffdice.experiments.placement import contact_frequency, landing_speed
 from stiffdice.scene import validation
-from stiffdice.scene.scene import Launch, Scene
+from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 
@@ -34,7 +34,8 @@ RATIOS = {
     "friction": "horizontal over vertical impulse in that bounce, over mu",
 }
 
-# Periods of the contact that a cube at rest is looked at, and the ωh at which the exact contact is followed.
+# Periods of the contact over which the depth of a cube at rest is averaged, and the ωh at which the exact contact is
+# sampled.
 _PERIODS, _FINE = 10, 0.002
 
 
@@ -57,18 +58,31 @@ def measure(
     bounce flat and short, or stops sliding in the bounce.
     """
     names = stepper.chosen_from(methods)
-    grounds = [validation.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
-    steps = [validation.number("omega_h", value, "1", above=0) for value in omega_h]
+    grounds = options.stiffnesses(stiffness)
+    dampings = options.numbers("damping", damping, "kg/s", at_least=0)
+    steps = options.numbers("omega_h", omega_h, "1", above=0)
     phases = validation.count("phases", phases)
-    dampings = [validation.number("damping", value, "kg/s", at_least=0) for value in damping]
     found = np.full((len(RATIOS), len(names), len(grounds), len(dampings), len(steps)), np.nan)
     for s, d in np.ndindex(found.shape[2:4]):
-        ground = level(scene, stiffness=grounds[s], damping=dampings[d])
+        ground = flat(scene, stiffness=grounds[s], damping=dampings[d])
         _check_slides(ground)
-        wanted = _exactly(ground)
+        exact = _exact(ground)
         for k, j in np.ndindex(len(names), len(steps)):
-            found[:, k, s, d, j] = _ratios(names[k], ground, steps[j], phases, wanted)
-    return _dataset(scene, names, grounds, dampings, steps, found)
+            found[:, k, s, d, j] = _ratios(names[k], ground, steps[j], phases, exact)
+    grid = ("method", "stiffness", "damping", "omega_h")
+    attributes = dataset.provenance_attributes("Contacts over the exact ones", scene, MODEL, "method", __name__)
+    return xr.Dataset(
+        {name: quantity(grid, ratio, text) for (name, text), ratio in zip(RATIOS.items(), found, strict=True)},
+        {
+            "method": method_axis(names),
+            "stiffness": of_cells("stiffness", grounds),
+            "damping": quantity("damping", dampings, "ground damping", "kg s-1"),
+            "omega_h": of_cells("omega_h", steps),
+        },
+        attributes
+        | stepper.attributes(names)
+        | {"scene_note": "ground: level, gated, stiffness and damping as the dimensions say; an upright cube"},
+    )
 
 
 def _check_slides(scene: Scene) -> None:
@@ -78,62 +92,27 @@ def _check_slides(scene: Scene) -> None:
         raise InputError("launch.velocity: allowed is one along x, above 4 mu times the speed at the ground [m/s]")
 
 
-def _exactly(scene: Scene) -> tuple[float, float]:
+def _exact(scene: Scene) -> tuple[float, float]:
     """Return the restitution and the time below the surface [s] that are exact."""
-    speed = landing_speed(scene)
-    h = _FINE / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    smooth = scene.with_ground(friction=0.0)
-    return flat_bounce.restitution(smooth, speed), bounce("exact", smooth, speed, h, 0.5).contact_time
+    speed, smooth = landing_speed(scene), scene.with_ground(friction=0.0)
+    followed = bounce("exact", smooth, speed, _FINE / contact_frequency(scene), 0.5)
+    return flat_bounce.restitution(smooth, speed), followed.contact_time
 
 
 def _ratios(
-    method: str, scene: Scene, omega_h: float, phases: int, wanted: tuple[float, float]
+    method: str, scene: Scene, omega_h: float, phases: int, exact: tuple[float, float]
 ) -> tuple[float, float, float, float, float]:
-    h = omega_h / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    speed = landing_speed(scene)
-    smooth, rough = (
-        [bounce(method, scene.with_ground(friction=friction), speed, h, k / phases) for k in range(phases)]
-        for friction in (0.0, scene.ground.friction)
-    )
-    restitution, contact_time = wanted
-    friction = float(np.mean([part.slowed for part in rough])) / scene.ground.friction if scene.ground.friction else 1.0
+    """Return RATIOS of one method at one step size; exact: restitution and time below the surface [s]."""
+    h, speed, mu = omega_h / contact_frequency(scene), landing_speed(scene), scene.ground.friction
+    restitution, contact_time = exact
+    without = scene.with_ground(friction=0.0)
+    smooth, rough = ([bounce(method, there, speed, h, k / phases) for k in range(phases)] for there in (without, scene))
+    steps = math.ceil(_PERIODS * 2 * math.pi / (contact_frequency(scene) * h))
+    depth = scene.cube.side / 2 - float(np.mean(heights_at_rest(method, without, h, steps)))
     return (
-        _rest_depth(method, scene.with_ground(friction=0.0), h) / linear_theory.sag(scene),
+        depth / linear_theory.sag(scene),
         float(np.mean([part.restitution for part in smooth])) / restitution,
         float(np.mean([part.contact_time for part in smooth])) / contact_time,
         float(np.mean([part.restitution for part in rough])) / restitution,
-        friction,
+        float(np.mean([part.slowed for part in rough])) / mu if mu else 1.0,
     )
-
-
-def _rest_depth(method: str, scene: Scene, h: float) -> float:
-    """Return the mean depth [m] of a cube that is put where it would rest; one that would not swings about its own."""
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    place = scene.cube.side / 2 - linear_theory.sag(scene)
-    steps = math.ceil(_PERIODS * 2 * math.pi / (omega * h))
-    launch = Launch((0.0, 0.0, place), (0.0, 0.0, 0.0), node_velocity="rigid")
-    resting = dataclasses.replace(scene, launch=launch, duration=steps * h)
-    states = np.zeros(steps, STATE)
-    stepper.start(method, resting, MODEL, start_of(resting, MODEL), h).advance(states, 1)
-    return scene.cube.side / 2 - float(np.mean(states["position"][:, 2]))
-
-
-def _dataset(
-    scene: Scene, names: list[str], grounds: list[float], dampings: list[float], steps: list[float], found: Any
-) -> xr.Dataset:
-    grid = ("method", "stiffness", "damping", "omega_h")
-    coordinates: dict[str, Any] = dataset.method_coordinates(grounds, names) | {
-        "damping": ("damping", dampings, {"long_name": "ground damping", "units": "kg s-1"}),
-        "omega_h": ("omega_h", steps, dataset.CELL_ATTRIBUTES["omega_h"]),
-    }
-    attributes = dataset.provenance_attributes(
-        "Contacts over the exact ones", scene, MODEL, "method", "stiffdice.experiments.engines.contact"
-    )
-    attributes |= stepper.attributes(names) | {
-        "scene_note": "ground: level, gated, stiffness and damping as the dimensions say; an upright cube"
-    }
-    variables: dict[str, Any] = {
-        name: (grid, values, {"long_name": text, "units": "1"})
-        for (name, text), values in zip(RATIOS.items(), found, strict=True)
-    }
-    return xr.Dataset(variables, coordinates, attributes)

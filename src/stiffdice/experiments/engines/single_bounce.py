@@ -1,4 +1,4 @@
-"""One flat bounce by any method: launched so that a step meets the ground at a chosen phase, and looked at after."""
+"""One flat bounce by any method, launched so that a step meets the ground at a chosen phase."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import STATE, Array, States, start_of
 from stiffdice.errors import InputError
+from stiffdice.experiments.placement import contact_frequency, level, upright
 from stiffdice.scene.scene import Launch, Scene
 from stiffdice.simulation.engines import stepper
 
@@ -20,9 +21,6 @@ MODEL = "sliding"
 # with all nodes below it; or it left the range of doubles.
 OUTCOMES = ("leaves", "stays", "sinks", "blows_up")
 _PATIENCE = 5
-
-# How deep the cube goes, in units of the side: round-off in its height is none in the phase, upper nodes stay out.
-_DEPTHS = 1e-4, 0.5
 
 
 class Bounce(NamedTuple):
@@ -39,37 +37,27 @@ class Bounce(NamedTuple):
     slowed: float
 
 
-def level(scene: Scene, **ground: float) -> Scene:
+def flat(scene: Scene, **ground: float) -> Scene:
     """Return the scene on level ground under the `gated` law, with an upright cube and these numbers of the ground."""
-    flat = dataclasses.replace(scene.launch, angular_momentum=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0))
-    rigid = dataclasses.replace(flat, node_velocity="rigid")
-    changed = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated", **ground)
-    return dataclasses.replace(changed, launch=rigid)
+    return upright(level(scene, **ground), node_velocity="rigid")
 
 
-def landing_speed(scene: Scene) -> float:
-    """Return the speed [m/s] at which the launch, in free fall, meets level ground with its lower face.
-
-    Raises InputError unless it does, and goes in by a length that is neither lost in the side nor all of it.
-    """
-    fall = scene.launch.position[2] - scene.cube.side / 2
-    speed = math.sqrt(max(0.0, scene.launch.velocity[2] ** 2 + 2 * scene.gravity * fall))
-    omega = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
-    low, high = (part * scene.cube.side for part in _DEPTHS)
-    if not (fall > 0 and low * omega <= speed <= high * omega):
-        raise InputError(
-            f"launch: the cube meets the ground at v = {speed:.3g} m/s, with ω = {omega:.3g} rad/s; allowed is one "
-            f"from above it, to a depth v/ω of {low:.3g} to {high:.3g} [m]"
-        )
-    return speed
+def heights_at_rest(method: str, scene: Scene, h: float, steps: int, nudge: float = 0.0) -> Array:
+    """Return the centre's heights [m] in steps of h [s], of a cube put where it would rest, or a nudge [m] above."""
+    height = scene.cube.side / 2 - linear_theory.sag(scene) + nudge
+    launch = Launch((0.0, 0.0, height), (0.0, 0.0, 0.0), node_velocity="rigid")
+    resting = dataclasses.replace(scene, launch=launch, duration=steps * h)
+    states = np.zeros(steps, STATE)
+    stepper.start(method, resting, MODEL, start_of(resting, MODEL), h).advance(states, 1)
+    return np.asarray(states["position"][:, 2])
 
 
 def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> Bounce:
     """Return what becomes of a flat cube that comes down at a speed [m/s], in steps of h [s].
 
-    scene: of `level`. phase [1]: how much of a step has passed when the lowest nodes meet the surface.
+    scene: of `flat`. phase [1]: how much of a step has passed when the lowest nodes meet the surface.
     """
-    contact = math.pi / linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass)
+    contact = math.pi / contact_frequency(scene)
     chunk = 3 + math.ceil(1.2 * contact / h)
     scene, launch = _launched(scene, method, speed, h, phase, chunk * _PATIENCE)
     engine = stepper.start(method, scene, MODEL, launch, h)
@@ -83,7 +71,14 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
             break
     if outcome != "leaves":
         return Bounce(outcome, math.nan, math.nan, math.nan)
-    return _told(scene, states, stepper.lag(method) * h * scene.gravity, h, speed)
+    low = states["position"][:, 2] - scene.cube.side / 2
+    # The slope of the path, which the velocity is behind: in the air by gravity's pull.
+    up = states["velocity"][-1, 2] - stepper.lag(method) * h * scene.gravity
+    leaving = math.sqrt(up**2 + 2 * scene.gravity * low[-1])
+    contact_time = _below(low) * h
+    slowed = states["velocity"][0, 0] - states["velocity"][-1, 0]
+    normal = leaving + speed + scene.gravity * contact_time
+    return Bounce("leaves", leaving / speed, contact_time, float(slowed / normal))
 
 
 def _launched(scene: Scene, method: str, speed: float, h: float, phase: float, steps: int) -> tuple[Scene, States]:
@@ -105,18 +100,6 @@ def _outcome(scene: Scene, states: States) -> str:
     if low > 0 and last["velocity"][2] > 0:
         return "leaves"
     return "sinks" if low < -scene.cube.side else "stays"
-
-
-def _told(scene: Scene, states: States, lag: float, h: float, speed: float) -> Bounce:
-    low = states["position"][:, 2] - scene.cube.side / 2
-    # The slope of the path, which the velocity is behind: in the air by gravity's pull.
-    up = states["velocity"][-1, 2] - lag
-    leaving = math.sqrt(up**2 + 2 * scene.gravity * low[-1])
-    contact_time = _below(low) * h
-    slowed = states["velocity"][0, 0] - states["velocity"][-1, 0]
-    return Bounce(
-        "leaves", leaving / speed, contact_time, float(slowed / (leaving + speed + scene.gravity * contact_time))
-    )
 
 
 def _below(heights: Array) -> float:

@@ -1,22 +1,21 @@
 """How many steps a second: the same motion in steps of the same size, by every method of fixed step.
 
 What is timed is stepping alone, one run at a time: each engine has built its model of the scene before. A method that
-takes steps of its own is told by its force evaluations.
+takes steps of its own is measured by its force evaluations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.state import Array, start_of
 from stiffdice.experiments.engines.limits import METHODS
+from stiffdice.experiments.layout import enum, method_axis, quantity
 from stiffdice.experiments.timing import Launched, interleaved, machine
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, scene_of
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -35,7 +34,7 @@ def time(
 ) -> xr.Dataset:
     """Return median times of runs [s] and what they took, dimensions problem, method; not-a-number where one is unfit.
 
-    scene: of which the problems of TIMED are made, at its own stiffness. methods: names of schemes and engines. steps:
+    scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
 
     Raises InputError for a number out of range, and an engine that is not installed.
@@ -53,23 +52,15 @@ def time(
         counted: Array = np.array([run.ready()() for run in runs])  # what is not compiled yet is now
         taken[p, fit] = np.where(own, counted, steps)
         seconds[p, fit], spread[p, fit] = interleaved(runs, rounds, affordable)
-    attributes = dataset.provenance_attributes(
-        "Steps a second", scene, "problem", "method", "stiffdice.experiments.engines.speed"
-    )
+    attributes = dataset.provenance_attributes("Steps a second", scene, "problem", "method", __name__)
     attributes |= stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
-    described: dict[str, tuple[Any, str, str]] = {
-        "seconds": (seconds, "median wall time of a run, started before", "s"),
-        "spread": (spread, "half the range between the quartiles of the times over their median", "1"),
-        "taken": (taken, "steps of the run; force evaluations of one that takes its own steps", "1"),
-    }
+    grid = ("problem", "method")
     return xr.Dataset(
         {
-            name: (("problem", "method"), values, {"long_name": text, "units": unit})
-            for name, (values, text, unit) in described.items()
+            "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),
+            "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
+            "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
         },
-        {
-            "problem": ("problem", np.arange(len(TIMED), dtype=np.int8), enum_attributes("problem", TIMED)),
-            "method": dataset.method_coordinates([1.0], names)["method"],
-        },
+        {"problem": enum("problem", TIMED, "problem"), "method": method_axis(names)},
         attributes,
     )

@@ -7,19 +7,21 @@ controls its own error from a coarse tolerance to a fine one; an exact scheme ha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import STATE
+from stiffdice.experiments.layout import EFFORT_GRID, EFFORTS, Variable, quantity
+from stiffdice.experiments.sampling import states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import fixed_step as stepping
 from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS
 from stiffdice.simulation.fixed_step import Path
 from stiffdice.simulation.run import simulate
@@ -29,7 +31,7 @@ EXACT = frozenset({"exact"})
 # Schemes that control their own error; steps are the intervals after which a state is known.
 CONTROLLED = schemes.OWN_STEPS
 
-# Engines that take the steps they are told, one by one.
+# Engines of fixed step.
 STEPPING = [name for name, peer in ENGINES.items() if not peer.own_steps]
 
 # Stands for every scheme that can run a problem, and the outside solvers; engines are named one by one.
@@ -39,6 +41,10 @@ ALL = "all"
 COARSE, FINE = 1e-2, 1e-12
 # ωh of a flat landing where the ladder of a fixed step begins: where the explicit schemes are stable.
 LONGEST = 1.5
+
+
+# Zero past a ladder's end, where other numbers are not-a-number.
+_COUNTS = {"steps", "evaluations", "evaluations_computed"}
 
 
 class Effort(NamedTuple):
@@ -68,7 +74,7 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
 
 
 def fixed_step(method: str) -> bool:
-    """Return whether a method takes steps of the size it is told."""
+    """Return whether a method has a fixed step."""
     return not PEERS[method].own_steps if method in PEERS else method not in EXACT | CONTROLLED
 
 
@@ -113,17 +119,29 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
         leap=True,
         budget=budget,
     )
-    assert run.trajectory is not None
-    states = np.full(SAMPLES + 1, np.nan, STATE)
-    states[: len(run.trajectory.state)] = run.trajectory.state
     computed = int(run.evaluations[0])
     stages = computed / max(1, int(run.steps_computed[0]))
-    return Path(states, round(stages * effort.steps), computed)
+    return Path(states_of(run, SAMPLES), round(stages * effort.steps), computed)
 
 
 def lag_time(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
-    if not fixed_step(method):
-        return 0.0
-    lag: float = engines.adapter_of(method).LAG if method in PEERS else schemes.LAGS[method]
-    return lag * scene.duration / effort.steps
+    return stepper.lag(method) * scene.duration / effort.steps if fixed_step(method) else 0.0
+
+
+def by_effort(
+    found: Sequence[Sequence[Sequence[Mapping[str, float]]]], described: Mapping[str, tuple[str, str]]
+) -> dict[str, Variable]:
+    """Return numbers of the runs on each method's ladder as variables, dimensions stiffness, method, effort.
+
+    found: by stiffness, method and effort, numbers by name. described: meaning and unit of those that are not EFFORTS.
+    Past a ladder's end are zeros for counts, else not-a-numbers.
+    """
+    shape = len(found), len(found[0]), max(1, *(len(rungs) for row in found for rungs in row))
+    variables = {}
+    for name, text in {**EFFORTS, **described}.items():
+        values = np.zeros(shape, np.int64) if name in _COUNTS else np.full(shape, np.nan)
+        for i, k in np.ndindex(shape[:2]):
+            values[i, k, : len(found[i][k])] = [rung[name] for rung in found[i][k]]
+        variables[name] = quantity(EFFORT_GRID, values, *text)
+    return variables

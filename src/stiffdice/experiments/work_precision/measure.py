@@ -7,28 +7,18 @@ differ from it.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics import linear_theory
-from stiffdice.experiments.work_precision.effort import (
-    ALL,
-    CONTROLLED,
-    EXACT,
-    FINE,
-    Effort,
-    chosen_from,
-    fixed_step,
-    ladder,
-    lag_time,
-    methods_for,
-    path_of,
-)
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import enum, method_axis, of_cells, quantity
+from stiffdice.experiments.placement import contact_frequency, fall_speed, relaunched
+from stiffdice.experiments.work_precision import effort as efforts
+from stiffdice.experiments.work_precision.effort import ALL, Effort, fixed_step, methods_for, path_of
 from stiffdice.experiments.work_precision.problems import (
     MEASURES,
     PROBLEMS,
@@ -39,19 +29,17 @@ from stiffdice.experiments.work_precision.problems import (
     touchdown,
 )
 from stiffdice.integrators import registry as schemes
-from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.engines.registry import PEERS
-from stiffdice.simulation.fixed_step import Path
 
-# What may be taken for right, best first; a peer is asked for all it can give.
+# What may be taken for right, best first; a peer at the least tolerance it has.
 REFERENCES: dict[str, Effort] = (
-    {name: Effort(SAMPLES, math.nan) for name in sorted(EXACT)}
-    | {name: Effort(SAMPLES, schemes.FINEST) for name in sorted(CONTROLLED)}  # finer than any rung
-    | {"scipy_dop853": Effort(0, 1e-13), "scipy_lsoda": Effort(0, FINE)}
+    {name: Effort(SAMPLES, math.nan) for name in sorted(efforts.EXACT)}
+    | {name: Effort(SAMPLES, schemes.FINEST) for name in sorted(efforts.CONTROLLED)}  # finer than any rung
+    | {"scipy_dop853": Effort(0, 1e-13), "scipy_lsoda": Effort(0, efforts.FINE)}
 )
 
 # So many first rungs may be too dear.
@@ -62,13 +50,15 @@ _NUDGE = 1e-6
 
 _HALF_UNIT = 2.0**-53
 
+_NOTE = "the problem's: level ground, gated, at the stiffness of the dimension; the scheme is its method"
+_AGREEMENT = "difference of a reference from the first, by each measure"
+_FLOOR = "what half a unit in the last place becomes: low, one in the launch; high, one in the depth of a contact"
 
-class Rung(NamedTuple):
-    """One run on a ladder: what was spent, and how far off it was by each measure."""
 
-    effort: Effort
-    path: Path
-    errors: dict[str, float]
+_DESCRIBED = {f"{name}_error": (text, "1") for name, text in MEASURES.items()} | {
+    "evaluations": ("evaluations of the force in plain stepping", "1"),
+    "evaluations_computed": ("evaluations of the force that were made, the others taken at once", "1"),
+}
 
 
 def measure(
@@ -94,11 +84,11 @@ def measure(
     Raises InputError for a number out of range, and for a scene in which the cube does not land and leave again.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
-    grounds = [validation.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
+    grounds = options.stiffnesses(stiffness)
     per_decade, budget = validation.count("per_decade", per_decade), validation.count("budget", budget)
     steps = validation.number("steps", steps, "1", at_least=SAMPLES)
     scenes = [scene_of(chosen, scene, value) for value in grounds]
-    names, fit = chosen_from(chosen, methods), methods_for(chosen)
+    names, fit = efforts.chosen_from(chosen, methods), methods_for(chosen)
     sources = [name for name in REFERENCES if name in fit]
     found, agreement, floor = [], [], []
     for ground in scenes:
@@ -108,43 +98,40 @@ def measure(
         floor.append(_floors(chosen, ground, sources[0], judge, budget))
         found.append([_climbed(chosen, ground, name, judge, per_decade, steps, budget) for name in names])
     attributes = dataset.provenance_attributes(
-        f"Work and precision: {chosen.name}",
-        scene,
-        chosen.model,
-        "method",
-        "stiffdice.experiments.work_precision.measure",
-    ) | {
-        "scene_note": "the problem's: level ground, gated, at the stiffness of the dimension; the scheme is its method",
-        "problem": problem,
-        "samples": SAMPLES,
-        "reference": sources[0],
-    }
-    attributes |= stepper.attributes(names)
+        f"Work and precision: {chosen.name}", scene, chosen.model, "method", __name__
+    )
     return xr.Dataset(
-        _variables(found) | _reference_variables(agreement, floor),
-        dataset.method_coordinates(grounds, names)
+        efforts.by_effort(found, _DESCRIBED)
         | {
-            "source": ("source", np.arange(len(sources), dtype=np.int8), enum_attributes("reference", sources)),
-            "bound": ("bound", np.arange(2, dtype=np.int8), enum_attributes("bound of the floor", ["low", "high"])),
-            "measure": ("measure", np.arange(len(MEASURES), dtype=np.int8), enum_attributes("error", list(MEASURES))),
+            "agreement": quantity(("stiffness", "source", "measure"), agreement, _AGREEMENT),
+            "floor": quantity(("stiffness", "bound", "measure"), floor, _FLOOR),
         },
-        attributes,
+        {
+            "stiffness": of_cells("stiffness", grounds),
+            "method": method_axis(names),
+            "source": enum("source", sources, "reference"),
+            "bound": enum("bound", ["low", "high"], "bound of the floor"),
+            "measure": enum("measure", list(MEASURES), "error"),
+        },
+        attributes
+        | stepper.attributes(names)
+        | {"scene_note": _NOTE, "problem": problem, "samples": SAMPLES, "reference": sources[0]},
     )
 
 
 def _climbed(
     problem: Problem, scene: Scene, method: str, judge: Judge, per_decade: int, steps: float, budget: int
-) -> list[Rung]:
+) -> list[dict[str, float]]:
     """Return the rungs of a method's ladder that the budget allows.
 
     The first may be too dear where later ones are not: a cube that a long step keeps on the ground has no flights.
     """
-    rungs: list[Rung] = []
+    rungs: list[dict[str, float]] = []
     too_dear = 0
     most = budget / stepper.dearness(method)
     growth = 10 ** (1 / per_decade) if fixed_step(method) else 1.0  # known beforehand
-    for effort in ladder(scene, method, per_decade, steps):
-        if len(rungs) > 1 and rungs[-1].path.computed * growth > most:
+    for effort in efforts.ladder(scene, method, per_decade, steps):
+        if len(rungs) > 1 and rungs[-1]["evaluations_computed"] * growth > most:
             break
         if method in PEERS and effort.steps > most:  # an engine takes every one of them
             break
@@ -154,7 +141,12 @@ def _climbed(
             if rungs or too_dear == _TRIES:
                 break
             continue
-        rungs.append(Rung(effort, path, judge.errors(path.states, lag_time(scene, method, effort))))
+        errors = judge.errors(path.states, efforts.lag_time(scene, method, effort))
+        rungs.append(
+            effort._asdict()
+            | {f"{name}_error": error for name, error in errors.items()}
+            | {"evaluations": path.evaluations, "evaluations_computed": path.computed}
+        )
     return rungs
 
 
@@ -165,14 +157,14 @@ def _floors(problem: Problem, scene: Scene, source: str, judge: Judge, budget: i
     of the place is one of the depth, which is only v/ω: relative to what the contact does it is ω r/v times as large.
     """
     nudge, radius = _NUDGE, scene.cube.radius
-    speed = math.sqrt(2 * scene.gravity * (scene.launch.position[2] - touchdown(scene)) + scene.launch.velocity[2] ** 2)
+    speed = fall_speed(scene, scene.launch.position[2] - touchdown(scene))
     squares = dict.fromkeys(MEASURES, 0.0)
     for nudged in _nudged(scene, nudge * radius, nudge * speed, problem.turns):
         errors = judge.errors(path_of(problem, nudged, source, REFERENCES[source], budget).states)
         squares = {name: squares[name] + (errors[name] / nudge) ** 2 for name in MEASURES}
     # A measure is a number itself, of the order of one.
     launch = [max(1.0, math.sqrt(square)) * _HALF_UNIT for square in squares.values()]
-    deep = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * radius / speed
+    deep = contact_frequency(scene) * radius / speed
     return [launch, [part * max(1.0, deep) for part in launch]]
 
 
@@ -186,36 +178,5 @@ def _nudged(scene: Scene, place: float, speed: float, turns: bool) -> list[Scene
             value = np.array(launch.spin if key == "angular_momentum" else getattr(launch, key))
             value[axis] += change
             moved: Any = {key: (float(value[0]), float(value[1]), float(value[2]))}
-            scenes.append(dataclasses.replace(scene, launch=dataclasses.replace(launch, **moved)))
+            scenes.append(relaunched(scene, **moved))
     return scenes
-
-
-def _variables(found: Sequence[Sequence[Sequence[Rung]]]) -> dict[str, Any]:
-    """Return what was found as variables, dimensions stiffness, method, effort."""
-    longest = max(1, *(len(rungs) for row in found for rungs in row))
-    shape = len(found), len(found[0]), longest
-    numbers = {name: np.full(shape, np.nan) for name in ("tolerance", *(f"{name}_error" for name in MEASURES))}
-    counts = {name: np.zeros(shape, np.int64) for name in ("steps", "evaluations", "evaluations_computed")}
-    for i, k in np.ndindex(shape[:2]):
-        for j, (effort, path, errors) in enumerate(found[i][k]):
-            counts["steps"][i, k, j] = effort.steps
-            counts["evaluations"][i, k, j] = path.evaluations
-            counts["evaluations_computed"][i, k, j] = path.computed
-            numbers["tolerance"][i, k, j] = effort.tolerance
-            for name, error in errors.items():
-                numbers[f"{name}_error"][i, k, j] = error
-    texts = {f"{name}_error": text for name, text in MEASURES.items()} | {
-        "evaluations": "evaluations of the force in plain stepping",
-        "evaluations_computed": "evaluations of the force that were made, the others taken at once",
-    }
-    told = {name: {"long_name": text, "units": "1"} for name, text in texts.items()} | dataset.EFFORT_ATTRIBUTES
-    return {name: (dataset.EFFORT_DIMENSIONS, values, told[name]) for name, values in (counts | numbers).items()}
-
-
-def _reference_variables(agreement: list[list[list[float]]], floor: list[list[list[float]]]) -> dict[str, Any]:
-    told = "difference of a reference from the first, by each measure"
-    says = "what half a unit in the last place becomes: low, one in the launch; high, one in the depth of a contact"
-    return {
-        "agreement": (("stiffness", "source", "measure"), np.array(agreement), {"long_name": told, "units": "1"}),
-        "floor": (("stiffness", "bound", "measure"), np.array(floor), {"long_name": says, "units": "1"}),
-    }

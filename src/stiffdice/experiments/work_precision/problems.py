@@ -5,7 +5,6 @@ All are on level ground under the gated law. A path is known at the launch and a
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import NamedTuple
 
@@ -16,6 +15,8 @@ from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import Array, States, physics_of, start_of
 from stiffdice.errors import InputError
+from stiffdice.experiments.bisection import bisected
+from stiffdice.experiments.placement import level, relaunched, upright
 from stiffdice.scene.scene import Scene
 
 # Few, so that keeping them costs next to nothing; between two of them there is a flight after the first landing.
@@ -30,7 +31,7 @@ MEASURES = {
 
 
 class Problem(NamedTuple):
-    """A kind of motion: the model that computes it, whether the ground rubs, and how it is called in a figure."""
+    """A kind of motion: the model that computes it, whether the ground rubs, and its name in a figure."""
 
     model: str
     rubs: bool
@@ -55,11 +56,8 @@ def scene_of(problem: Problem, scene: Scene, stiffness: float) -> Scene:
     Raises InputError for a launch that is not from above the ground, under gravity.
     """
     friction = scene.ground.friction if problem.rubs else 0.0
-    scene = scene.with_ground(normal=(0.0, 0.0, 1.0), contact="gated", stiffness=stiffness, friction=friction)
-    if not problem.turns:
-        flat = dataclasses.replace(scene.launch, angular_momentum=(0.0, 0.0, 0.0), orientation=(0.0, 0.0, 0.0))
-        scene = dataclasses.replace(scene, launch=flat)
-    scene = dataclasses.replace(scene, launch=dataclasses.replace(scene.launch, node_velocity="rigid"))
+    scene = relaunched(level(scene, stiffness=stiffness, friction=friction), node_velocity="rigid")
+    scene = scene if problem.turns else upright(scene)
     if scene.gravity == 0 or not _clearance(scene, 0.0) > 0:
         raise InputError("allowed are launches from above the ground, under gravity")
     return scene
@@ -87,9 +85,7 @@ def touchdown(scene: Scene) -> float:
     if below is None:
         raise InputError(f"duration = {scene.duration:g}: allowed is one in which the cube lands [s]")
     early, late = float(times[below - 1]), float(times[below])
-    while early < (middle := (early + late) / 2) < late:
-        early, late = (middle, late) if _clearance(scene, middle) > 0 else (early, middle)
-    return _height(scene, late)
+    return _height(scene, bisected(lambda time: _clearance(scene, time) > 0, early, late)[1])
 
 
 class Judge:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.state import start_of
+from stiffdice.experiments import options
+from stiffdice.experiments.layout import method_axis, of_cells, quantity
 from stiffdice.experiments.timing import Launched, Times, interleaved, machine, seconds_of
-from stiffdice.experiments.work_precision.effort import ALL, Effort, chosen_from, fixed_step, ladder, plain
+from stiffdice.experiments.work_precision.effort import ALL, Effort, by_effort, chosen_from, fixed_step, ladder, plain
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Problem, scene_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -27,6 +28,12 @@ class Rung(NamedTuple):
     run: Callable[[], object]
     first: float
 
+
+_DESCRIBED = {
+    "seconds": ("median wall time of a run", "s"),
+    "spread": ("half the range between the quartiles of the times over their median", "1"),
+}
+_PER_STEP = "wall time per step of a fixed step, from the longest run timed"
 
 # Of a fixed step's ladder so many rungs are timed, the longest that are affordable: time is proportional to steps.
 _RUNGS = 3
@@ -48,13 +55,13 @@ def time(
 
     problem, methods, stiffness, per_decade: as for the experiment `work-precision`. affordable [s]: longer runs are
     timed once. The ladder of a fixed step ends there, as above it `seconds_per_step` says, any other after three times
-    that. rounds: in each every run is timed; the median is told. `first_seconds` is a method's first call in a fresh
+    that. rounds: in each every run is timed; the median is stored. `first_seconds` is a method's first call in a fresh
     process, which loads compiled code, or compiles it if nobody has; everything else is warm.
 
     Raises InputError as the experiment does.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
-    grounds = [validation.number("stiffness", value, "kg/s²", above=0) for value in stiffness]
+    grounds = options.stiffnesses(stiffness)
     affordable = validation.number("affordable", affordable, "s", above=0)
     per_decade, rounds = validation.count("per_decade", per_decade), validation.count("rounds", rounds)
     names = chosen_from(chosen, methods)
@@ -63,19 +70,35 @@ def time(
         ground = scene_of(chosen, scene, value)
         climbed.append([_climbed(chosen, ground, name, per_decade, affordable) for name in names])
         times.append(interleaved([rung.run for rungs in climbed[-1] for rung in rungs], rounds, affordable))
+    rows = [_numbers(rungs_of, taken) for rungs_of, taken in zip(climbed, times, strict=True)]
+    per_step = [[_per_step(name, rungs) for name, rungs in zip(names, row, strict=True)] for row in rows]
     attributes = dataset.provenance_attributes(
-        f"Time of work and precision: {chosen.name}",
-        scene,
-        chosen.model,
-        "method",
-        "stiffdice.experiments.work_precision.time",
-    ) | {"problem": problem, "samples": SAMPLES, "rounds": rounds}
-    attributes |= stepper.attributes(names)
-    first = [rungs[0].first for rungs in climbed[0]]
-    variables = _variables(climbed, times, names) | {
-        "first_seconds": ("method", first, {"long_name": "first call in a fresh process", "units": "s"}),
-    }
-    return xr.Dataset(variables, dataset.method_coordinates(grounds, names), attributes | machine())
+        f"Time of work and precision: {chosen.name}", scene, chosen.model, "method", __name__
+    )
+    return xr.Dataset(
+        by_effort(rows, _DESCRIBED)
+        | {
+            "seconds_per_step": quantity(("stiffness", "method"), per_step, _PER_STEP, "s"),
+            "first_seconds": quantity(
+                "method", [rungs[0].first for rungs in climbed[0]], "first call in a fresh process", "s"
+            ),
+        },
+        {"stiffness": of_cells("stiffness", grounds), "method": method_axis(names)},
+        attributes | {"problem": problem, "samples": SAMPLES, "rounds": rounds} | stepper.attributes(names) | machine(),
+    )
+
+
+def _per_step(method: str, rungs: Sequence[dict[str, float]]) -> float:
+    return rungs[-1]["seconds"] / rungs[-1]["steps"] if fixed_step(method) else math.nan
+
+
+def _numbers(climbed: Sequence[Sequence[Rung]], times: Times) -> list[list[dict[str, float]]]:
+    """Return the numbers of each rung, by method; times: of all rungs, one method after another."""
+    taken = iter(zip(times.median, times.spread, strict=True))
+    return [
+        [rung.effort._asdict() | dict(zip(("seconds", "spread"), next(taken), strict=True)) for rung in rungs]
+        for rungs in climbed
+    ]
 
 
 def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affordable: float) -> list[Rung]:
@@ -101,28 +124,3 @@ def _timed(problem: Problem, scene: Scene, method: str, effort: Effort) -> Calla
         return plain(problem, scene, method, effort)
     launch = start_of(scene, problem.model)
     return Launched(stepper.ready(method, scene, problem.model, launch, effort.steps, SAMPLES))
-
-
-def _variables(
-    climbed: Sequence[Sequence[Sequence[Rung]]], times: Sequence[Times], names: Sequence[str]
-) -> dict[str, Any]:
-    shape = len(climbed), len(names), max(len(rungs) for row in climbed for rungs in row)
-    numbers = {name: np.full(shape, np.nan) for name in ("tolerance", "seconds", "spread")}
-    steps, per_step = np.zeros(shape, np.int64), np.full(shape[:2], np.nan)
-    for i, row in enumerate(climbed):
-        places = [(k, j) for k, rungs in enumerate(row) for j in range(len(rungs))]
-        for (k, j), median, spread in zip(places, times[i].median, times[i].spread, strict=True):
-            effort = row[k][j].effort
-            steps[i, k, j], numbers["tolerance"][i, k, j] = effort
-            numbers["seconds"][i, k, j], numbers["spread"][i, k, j] = median, spread
-            if fixed_step(names[k]):
-                per_step[i, k] = median / effort.steps
-    told: dict[str, dict[str, Any]] = dataset.EFFORT_ATTRIBUTES | {
-        "seconds": {"long_name": "median wall time of a run", "units": "s"},
-        "spread": {"long_name": "half the range between the quartiles of the times over their median", "units": "1"},
-    }
-    variables: dict[str, Any] = {
-        name: (dataset.EFFORT_DIMENSIONS, values, told[name]) for name, values in (numbers | {"steps": steps}).items()
-    }
-    per = {"long_name": "wall time per step of a fixed step, from the longest run timed", "units": "s"}
-    return variables | {"seconds_per_step": (dataset.EFFORT_DIMENSIONS[:2], per_step, per)}

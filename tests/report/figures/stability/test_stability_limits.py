@@ -13,8 +13,10 @@ from stiffdice.report.figures import registry as figures
 from stiffdice.report.figures import style
 from stiffdice.scene.scene import from_mapping
 from stiffdice.study import catalogue
-from stiffdice.sweep import stability_limits, sweep
+from stiffdice.sweep import stability_limits
+from stiffdice.sweep.collect import collect
 from stiffdice.sweep.grid import Sweep
+from stiffdice.sweep.shard import compute_shard
 
 TOLERANCES = {"energy": 0.05, "apex": 0.02}
 
@@ -37,9 +39,9 @@ def swept(folder, damping, contact, stiffness, steps, omega_h, criteria):
         horizon=10.0,
     )
     path = folder / f"{damping}-{'-'.join(contact)}.h5"
-    sweep.compute(plan, rounds.scan(plan), path)
+    compute_shard(plan, rounds.scan(plan), path)
     with xr.open_dataset(path, engine="h5netcdf") as shard:
-        return stability_limits.find(sweep.collect([shard], plan.criteria))
+        return stability_limits.find(collect([shard], plan.criteria))
 
 
 @pytest.fixture(scope="module")

@@ -8,19 +8,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from tests import rounds
-from tests.conftest import ROOT, each
+from tests.conftest import ROOT
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.reader import open_file
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import simulate
-from stiffdice.sweep import sweep
+from stiffdice.sweep.collect import collect
 from stiffdice.sweep.grid import Column, Sweep
+from stiffdice.sweep.shard import BLOCK, compute_shard
 
 DEFAULTS = {"finite": 0.0, "energy": 0.05, "apex": 0.02}
 
@@ -48,12 +47,12 @@ def small(**changes):
 def computed(planned, folder, columns=None, name="x"):
     """The shard that the scans of these columns (all of them by default) make."""
     path = folder / f"{name}.h5"
-    sweep.compute(planned, rounds.scan(planned, columns), path)
+    compute_shard(planned, rounds.scan(planned, columns), path)
     return open_file(path)
 
 
 def collected(planned, folder, **options):
-    return sweep.collect([computed(planned, folder, **options)], planned.criteria)
+    return collect([computed(planned, folder, **options)], planned.criteria)
 
 
 def test_cells_do_not_know_their_shard(tmp_path):
@@ -62,24 +61,13 @@ def test_cells_do_not_know_their_shard(tmp_path):
     columns = planned.columns()
     whole = collected(planned, tmp_path)
     parts = [computed(planned, tmp_path, columns[k::3], f"{k}") for k in (2, 0, 1)]
-    xr.testing.assert_identical(whole, sweep.collect(parts, planned.criteria))
+    xr.testing.assert_identical(whole, collect(parts, planned.criteria))
 
 
 def test_equal_shards_are_equal_bytes(tmp_path):
     for name in "ab":
         computed(small(), tmp_path, name=name)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
-
-
-def test_a_collected_sweep_is_sorted(tmp_path):
-    planned = small()
-    found = collected(planned, tmp_path, columns=planned.columns()[::-1])
-    rows = list(zip(found.contact.values, found.stiffness.values, found.steps.values, strict=True))
-    assert rows == sorted(
-        (planned.contact.index(column.contact), column.stiffness, steps)
-        for column in planned.columns()
-        for steps in planned.scan(column)
-    )
 
 
 def test_every_cell_says_where_it_is_and_everything_what_it_is(tmp_path):
@@ -96,7 +84,7 @@ def test_every_cell_says_where_it_is_and_everything_what_it_is(tmp_path):
 @pytest.mark.parametrize("early_stop", [False, True])
 def test_a_shard_holds_what_the_simulator_says_of_each_member(tmp_path, early_stop):
     """More members than are computed together, so that they come in blocks."""
-    members = sweep.BLOCK + 6
+    members = BLOCK + 6
     planned = small(members=members, early_stop=early_stop, omega_h={"from": 3.0, "to": 0.5, "count": 4})
     column = Column("gated", 1e3)
     found = computed(planned, tmp_path, [column])
@@ -110,32 +98,6 @@ def test_a_shard_holds_what_the_simulator_says_of_each_member(tmp_path, early_st
             np.testing.assert_array_equal(found[name][k], values, err_msg=name)
         for name in ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided"):
             np.testing.assert_array_equal(found[name][k], getattr(run, name), err_msg=name)
-
-
-def test_a_collected_cell_is_what_its_members_add_up_to(tmp_path):
-    planned = small()
-    runs = computed(planned, tmp_path)
-    found = sweep.collect([runs], planned.criteria)
-    where = np.lexsort([runs[key].values for key in ("steps", "stiffness", "contact")])
-    runs = runs.isel(cell=where)
-    assert meanings_of(found.criterion) == list(planned.criteria)
-    assert found.tolerance.values.tolist() == list(planned.criteria.values())
-    for c, (name, tolerance) in enumerate(planned.criteria.items()):
-        part = criteria.CRITERIA[name]
-        fails = (runs[part.MEASURE].values > part.BASE + tolerance) | (runs.ending.values != Verdict.PASSED)
-        np.testing.assert_array_equal(found.failing[c], fails.sum(axis=1))
-        np.testing.assert_array_equal(found[f"largest_{part.MEASURE}"], runs[part.MEASURE].max("member"))
-    for verdict in Verdict:
-        np.testing.assert_array_equal(found.verdicts[:, verdict], (runs.verdict == verdict).sum("member"))
-    np.testing.assert_array_equal(found.steps_computed, runs.steps_computed.sum("member"))
-    assert found.attrs["members"] == planned.members
-
-
-def test_other_tolerances_judge_the_same_runs(tmp_path):
-    runs = computed(small(), tmp_path)
-    strict, lax = (sweep.collect([runs], {"energy": tolerance}) for tolerance in (0.01, 1e6))
-    ended_badly = (runs.ending != Verdict.PASSED).sum()
-    assert strict.failing.sum() > lax.failing.sum() == ended_badly > 0
 
 
 def test_a_run_that_left_the_range_of_doubles_fails_every_criterion(tmp_path):
@@ -214,45 +176,15 @@ def test_a_tumbling_sweep_turns_its_members_and_compares_each_with_its_own_refer
     launches = turned(planned.scene_of(column), "tumbling", 4)
     assert len({launch.tobytes() for launch in launches["node_offset"]}) == 4
     assert len(np.unique(runs.touchdown_phase.values[0])) == 4
-    assert meanings_of(sweep.collect([runs], planned.criteria).criterion) == ["finite", "energy", "trajectory"]
+    assert meanings_of(collect([runs], planned.criteria).criterion) == ["finite", "energy", "trajectory"]
 
 
 def test_progress_is_told_within_a_column(tmp_path):
-    planned, told = small(members=sweep.BLOCK + 1, omega_h={"from": 3.0, "to": 0.5, "count": 20}), []
-    sweep.compute(planned, rounds.scan(planned), tmp_path / "x.h5", told.append)
+    planned, told = small(members=BLOCK + 1, omega_h={"from": 3.0, "to": 0.5, "count": 20}), []
+    compute_shard(planned, rounds.scan(planned), tmp_path / "x.h5", told.append)
     assert len(told) == 2 * 2 * len(planned.columns())  # two blocks of members, two handfuls of cells
     assert told == sorted(told)
     assert told[-1] == 1.0
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({"members": 9}, "members, config, config_digest"),
-        ({"early_stop": True}, "early_stop, criteria, config, config_digest"),
-        ({"criteria": DEFAULTS | {"trajectory": 1.0}, "horizon": 1.0}, "horizon, horizon_units, config, config_digest"),
-        ({"scene": from_mapping({"cube": {"mass": 2}})}, "scene, scene_digest"),
-    ],
-)
-@pytest.mark.parametrize("order", [1, -1])
-def test_shards_of_different_sweeps_are_not_mixed(tmp_path, change, told, order):
-    cheap = {"omega_h": {"from": 3.0, "to": 2.0, "count": 2}}
-    shards = [
-        computed(small(**cheap, **options), tmp_path, [column])
-        for options, column in (({}, Column("gated", 1e2)), (change, Column("gated", 1e3)))
-    ]
-    with pytest.raises(InputError) as caught:
-        sweep.collect(shards[::order], DEFAULTS)
-    assert set(told.split(", ")) == set(
-        str(caught.value).removeprefix("shards differ in ").removesuffix("; they are not of one sweep").split(", ")
-    )
-
-
-def test_shards_of_different_code_are_not_mixed(shards, plan):
-    with_another = [*each(shards[:1]), *each(shards[:1])]
-    with_another[1] = with_another[1].assign_attrs(code_digest="0" * 64)
-    with pytest.raises(InputError, match="shards differ in code_digest"):
-        sweep.collect(with_another, plan.criteria)
 
 
 def stepped(scene, steps, late):
@@ -331,12 +263,12 @@ def test_the_scan_is_where_theory_says_trouble_is(collected, plan):
 PEAK = """
 import dataclasses, resource, sys
 from stiffdice.study import config as study
-from stiffdice.sweep import sweep
+from stiffdice.sweep.shard import compute_shard
 from stiffdice.sweep.grid import Piece
 plan = study.load("config/quick.yaml", "workflow/schemas/study.schema.yaml").sweeps["steps-needed"]
 plan = dataclasses.replace(plan, members=int(sys.argv[1]), contact=("gated",))
 column = plan.columns()[0]
-sweep.compute(plan, [Piece(column, plan.scan(column))], sys.argv[2])
+compute_shard(plan, [Piece(column, plan.scan(column))], sys.argv[2])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
 """
 
@@ -352,28 +284,3 @@ def test_memory_does_not_grow_with_the_members(tmp_path):
     few, many = peak(128), peak(6400)
     assert (tmp_path / "6400.h5").stat().st_size > 20 * (tmp_path / "128.h5").stat().st_size
     assert many - few < 20_000
-
-
-COLLECTED = """
-import resource, sys
-import numpy as np
-from stiffdice.sweep import sweep
-from stiffdice.io.reader import open_file
-shard, times = open_file(sys.argv[1]), int(sys.argv[2])
-part = shard.isel(cell=np.resize(np.arange(shard.sizes["cell"]), 1000))
-sweep.collect((part.copy(deep=True) for _ in range(times)), {"energy": 0.05, "apex": 0.05})
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)  # kB
-"""
-
-
-@pytest.mark.long
-def test_what_is_collected_leaves_its_runs_behind(tmp_path):
-    """A hundred thousand cells of 32 members: their measures alone would be 100 MB, all of their runs 400 MB."""
-    computed(small(members=32), tmp_path)
-    (shard,) = tmp_path.glob("*.h5")
-
-    def peak(times):
-        command = [sys.executable, "-c", COLLECTED, str(shard), str(times)]
-        return int(subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
-
-    assert peak(100) - peak(2) < 40_000

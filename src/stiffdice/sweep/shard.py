@@ -1,4 +1,4 @@
-"""Many runs: compute the columns of a shard, collect shards into one sweep of judged cells."""
+"""Many runs in one file: compute the cells of a shard, and check that a file holds those planned."""
 
 from __future__ import annotations
 
@@ -11,19 +11,16 @@ import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
-from stiffdice.errors import InputError, RefusedError
+from stiffdice.errors import RefusedError
 from stiffdice.io import schema
-from stiffdice.io.content_digest import CELL, cell_digests, runs_digest
+from stiffdice.io.content_digest import CELL
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend, dataset
-from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.initial_conditions import phased, turned
-from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import Run, simulate
 from stiffdice.sweep.grid import Column, Piece, Sweep
@@ -32,7 +29,7 @@ from stiffdice.sweep.grid import Column, Piece, Sweep
 _OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
 
 # Words of the enums of shards and sweeps.
-_MEANINGS = {"contact": list(LAWS), "verdict": dataset.VERDICTS, "ending": dataset.VERDICTS}
+MEANINGS = {"contact": list(LAWS), "verdict": dataset.VERDICTS, "ending": dataset.VERDICTS}
 
 # Members computed together: their references are in memory together.
 BLOCK = CHUNK_MEMBERS
@@ -48,7 +45,7 @@ class Kept(Protocol):
         """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
 
 
-def compute(
+def compute_shard(
     sweep: Sweep,
     pieces: Sequence[Piece],
     path: str | Path,
@@ -61,7 +58,7 @@ def compute(
     there already. progress: called with about the fraction of the work done.
     """
     total, done = sum(sum(piece.steps) for piece in pieces), 0.0
-    with Spool(path, pattern(sweep)) as spool:
+    with Spool(path, shard_pattern(sweep)) as spool:
         for piece in pieces:
             steps = sum(piece.steps)
             for fraction in _compute_piece(sweep, piece, spool, kept):
@@ -133,7 +130,7 @@ def _run_values(run: Run) -> dict[str, Any]:
     return run.measures | {name: getattr(run, name) for name in _OF_RUNS}
 
 
-def pattern(sweep: Sweep) -> xr.Dataset:
+def shard_pattern(sweep: Sweep) -> xr.Dataset:
     """Return one cell with all names, types, units and attributes of the sweep's shards, and no values of its own."""
     sizes = {"cell": 1, "member": sweep.members, "criterion": len(criteria.CRITERIA)}
     values: dict[str, Any] = {
@@ -147,11 +144,11 @@ def pattern(sweep: Sweep) -> xr.Dataset:
     values |= _cell_values(sweep, sweep.columns()[0], [1])
     values |= {name: np.arange(sizes[name], dtype=values[name].dtype) for name in ("member", "criterion")}
     attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
-    return schema.dataset("shard", values, _MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
+    return schema.dataset("shard", values, MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
 
 
 def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
-    code = "stiffdice.sweep.sweep", *backend.code_of(sweep.simulator)
+    code = "stiffdice.sweep.shard", *backend.code_of(sweep.simulator)
     attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
     attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
     attributes |= dataset.config_attributes("shard", sweep.of_runs)
@@ -167,13 +164,13 @@ def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     return attributes
 
 
-def checked(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
-    """Pass a shard on, part by part, if it is the one that `compute` would make of these pieces now.
+def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
+    """Pass a shard on, part by part, if it is the one that `compute_shard` would make of these pieces now.
 
     Raises RefusedError, naming what is other than planned: attributes (code and scene among them), variables, members,
     or cells.
     """
-    like = pattern(sweep)
+    like = shard_pattern(sweep)
     scans = [len(piece.steps) for piece in pieces]
     planned = {
         "contact": np.repeat([list(LAWS).index(piece.column.contact) for piece in pieces], scans),
@@ -204,86 +201,3 @@ def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
             raise RefusedError(f"not the shard planned: other variable {name}")
     if part.sizes["member"] != pattern.sizes["member"]:
         raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")
-
-
-def collect(
-    parts: Iterable[xr.Dataset], tolerances: Mapping[str, float], config: Mapping[str, Any] | None = None
-) -> xr.Dataset:
-    """Return all cells of all shards, judged: how many members fail each criterion, and the worst of each measure.
-
-    parts: shards, or some cells of one at a time (`io.reader.parts`): in memory are one part, and some 250 bytes for
-    each cell before it, however many members it has. config: what was asked of the whole; None leaves what was asked of
-    each run. Cells are sorted by contact law, stiffness and steps. Raises InputError if the shards were not made from
-    the same scene by the same code, or if there are none.
-    """
-    pattern: xr.Dataset | None = None
-    columns: dict[str, list[npt.NDArray[Any]]] = {}  # of each variable that has cells, its parts
-    digests = []
-    for part in parts:
-        judged = _judged(part, tolerances)
-        pattern = judged.isel(cell=slice(0)) if pattern is None else pattern
-        ours, others = judged.attrs, pattern.attrs
-        differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
-        if differing:
-            raise InputError(f"shards differ in {', '.join(differing)}; they are not of one sweep")
-        for name, variable in judged.variables.items():
-            if "cell" in variable.dims:
-                columns.setdefault(str(name), []).append(variable.values)
-        digests.append(cell_digests(part))
-    if pattern is None:
-        raise InputError("there are no shards; nothing to collect")
-    asked = dataset.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}
-    return _sorted(pattern, columns).assign_attrs(
-        asked,
-        title="Sweep of stiffness and steps",
-        runs_digest=runs_digest(digests),
-        judging_code_digest=code_digest("stiffdice.sweep.sweep"),
-    )
-
-
-def _sorted(pattern: xr.Dataset, columns: dict[str, list[npt.NDArray[Any]]]) -> xr.Dataset:
-    """Return all cells, sorted, in the variables of a dataset of none; empties `columns`: none is to be there twice."""
-    order = np.lexsort([np.concatenate(columns[key]) for key in ("steps", "stiffness", "contact")])
-    whole: dict[str, xr.Variable] = {}
-    for key, variable in pattern.variables.items():
-        name = str(key)
-        if name in columns:
-            axis = variable.dims.index("cell")
-            values = np.concatenate(columns.pop(name), axis).take(order, axis)
-            whole[name] = xr.Variable(variable.dims, values, variable.attrs)
-        else:
-            whole[name] = variable
-    return xr.Dataset(
-        {name: variable for name, variable in whole.items() if name not in pattern.coords},
-        {name: variable for name, variable in whole.items() if name in pattern.coords},
-        pattern.attrs,
-    )
-
-
-def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
-    """Return cells with what their members add up to."""
-    measures = {part.MEASURE: runs[part.MEASURE].values for part in criteria.CRITERIA.values()}
-    verdicts = runs["verdict"].values
-    counts = np.stack([(verdicts == verdict).sum(axis=1) for verdict in Verdict], axis=1)
-    values: dict[str, Any] = {
-        "failing": (~judge.passes(tolerances, measures, runs["ending"].values)).sum(axis=-1).astype(np.int32),
-        "verdicts": counts.astype(np.int32),
-        "steps_computed": runs["steps_computed"].values.sum(axis=1),
-        "tolerance": list(tolerances.values()),
-    }
-    for name in (criteria.CRITERIA[criterion].MEASURE for criterion in tolerances):
-        long_name = f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}"
-        values[f"largest_{name}"] = "cell", _largest(measures[name]), {"long_name": long_name, "units": "1"}
-    values |= {name: runs[name].values for name in dataset.CELL_ATTRIBUTES}
-    values |= {
-        "criterion": np.arange(len(tolerances), dtype=np.int8),
-        "verdict": np.arange(len(Verdict), dtype=np.int8),
-    }
-    attributes = dict(runs.attrs) | {"members": runs.sizes["member"]}
-    return schema.dataset("sweep", values, _MEANINGS | {"criterion": list(tolerances)}, attributes)
-
-
-def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the largest of the members, shape (cell,); not-a-number only where all are."""
-    numbers = np.where(np.isnan(measure), -np.inf, measure).max(axis=1)
-    return np.asarray(np.where(np.isneginf(numbers), np.nan, numbers))
