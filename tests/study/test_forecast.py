@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from stiffdice.simulation import batch_loop
 from stiffdice.study import catalogue, forecast, outputs
 from stiffdice.study import config as studies
 from stiffdice.sweep import partition
@@ -17,9 +18,12 @@ def load(study_schema, monkeypatch):
 
 @pytest.fixture
 def compiled(monkeypatch, tmp_path):
-    """A folder with the kernel of single runs, compiled."""
-    (tmp_path / "stiffdice_0").mkdir()
-    (tmp_path / "stiffdice_0/simulate._march-1.py311.0123456789abcdef.nbc").touch()
+    """A folder with the loop of a run, compiled, under the name that Numba gives it."""
+    loop = batch_loop._march
+    package, _, module = loop.py_func.__module__.rpartition(".")
+    folder = tmp_path / f"{package.rpartition('.')[2]}_0123456789abcdef"
+    folder.mkdir()
+    (folder / f"{module}.{loop.py_func.__qualname__}-1.py311.0123456789abcdef.nbc").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 
 

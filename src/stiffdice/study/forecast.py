@@ -110,9 +110,9 @@ def _compiled_for(study: Study, result: Result) -> tuple[str, ...]:
 
 
 def _is_compiled() -> bool:
-    """Return whether the kernel of single runs lies in the folder that `compiled` has chosen."""
+    """Return whether a loop of runs lies in the folder that `dynamics.compilation` has chosen."""
     folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
-    return any(folder.glob("*/simulate._march*.nbc"))
+    return any(folder.glob("simulation_*/*._march-*.nbc"))
 
 
 def slowness() -> float:
