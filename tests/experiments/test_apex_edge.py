@@ -17,12 +17,15 @@ STIFF = Scene().with_ground(stiffness=1e6)
 @pytest.fixture(scope="module")
 def found():
     return apex_edge.measure(
-        STIFF, hop_height=(0.01, 0.1, 0.3), duration=(10.0, 12.0), omega_h=(0.27, 1.9), count=60, members=8
+        STIFF, hop_height=(0.01, 0.1, 0.3), duration=(10.0, 12.0), omega_h=(0.27, 1.9), count=60, members=32
     )
 
 
 def test_the_edge_is_the_predicted_one_whatever_the_duration(found):
-    """Teeth are 1/n apart, 11 % at the lowest edge; a scan of 3 % may step over one, and never goes below."""
+    """Teeth are 1/n apart, 11 % at the lowest edge; a scan of 3 % may step over one, and never goes below.
+
+    Eight launches meet the top of a tooth too seldom: where they touch down is chance after a few bounces.
+    """
     predicted = np.broadcast_to(found.predicted.values[:, None, :], found.last_fail.shape)
     assert (found.last_fail.values > 0.985 * predicted).all()
     assert (found.last_fail.values < 1.25 * predicted).all()

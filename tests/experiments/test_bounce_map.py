@@ -172,8 +172,12 @@ def test_everything_is_named_has_units_and_survives_a_file(measured, tmp_path):
         ({}, {"omega_h": (0.1, 0.2, 0.3)}, "omega_h = "),
         ({}, {"count": 1}, "count = 1"),
         ({}, {"phases": 0}, "phases = 0"),
-        ({"ground": {"stiffness": 0}}, {}, "launch: .*ω = 0 rad/s; allowed is a depth"),
-        ({"ground": {"stiffness": 50}}, {}, "launch: .*allowed is a depth v/ω of 0.000104 to 0.518"),
+        ({"ground": {"stiffness": 0}}, {}, "launch: .*ω = 0 rad/s; allowed is a launch above it and a depth"),
+        (
+            {"ground": {"stiffness": 50}},
+            {},
+            "launch: .*allowed is a launch above it and a depth v/ω of 0.000104 to 0.518",
+        ),
         ({"ground": {"stiffness": 1e12}}, {}, "launch: "),
         (
             {"ground": {"stiffness": 300}, "launch": {"position": [0, 0, 0.6], "velocity": [0, 0, 0]}},

@@ -203,7 +203,9 @@ def test_a_budget_ends_each_member_and_a_run_that_needs_less_is_not_changed_by_i
     bound = simulate(scene, budget=most, **asked)
     spent = free.steps_computed > most
     assert spent.any() and not spent.all()
-    np.testing.assert_array_equal(bound.verdict == Verdict.UNDECIDED, spent)
+    undecided = bound.verdict == Verdict.UNDECIDED
+    assert undecided.any() and spent[undecided].all()
+    assert (bound.steps_done[~undecided] == 20_000).all()  # a flight to the end costs nothing
     np.testing.assert_array_equal(bound.steps_computed, np.minimum(free.steps_computed, most))
     assert bound.end[~spent].tobytes() == free.end[~spent].tobytes()
 

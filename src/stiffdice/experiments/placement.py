@@ -88,7 +88,7 @@ def landing_speed(scene: Scene) -> float:
     low, high = (part * scene.cube.side for part in _DEPTHS)
     if not (fall > 0 and low * omega <= speed <= high * omega):
         raise InputError(
-            f"launch: the cube meets the ground at v = {speed:.3g} m/s, with ω = {omega:.3g} rad/s; allowed is one "
-            f"from above it, to a depth v/ω of {low:.3g} to {high:.3g} [m]"
+            f"launch: the cube meets the ground at v = {speed:.3g} m/s, with ω = {omega:.3g} rad/s; allowed is "
+            f"a launch above it and a depth v/ω of {low:.3g} to {high:.3g} [m]"
         )
     return speed

@@ -372,8 +372,8 @@ def start(task: Task) -> Callable[[], bool] | None:
 def _balance(physics: Physics, axes: Array, h: float, sight: npt.NDArray[np.void]) -> Balance:
     up = axes[:, 2]
     behind = schemes.LAGS[SCHEME] * h * physics.gravity
-    weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
     with np.errstate(all="ignore"):
+        weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
         per_inertia = np.float64(0.5) / physics.inertia
         omega = np.sqrt(4 * physics.stiffness / np.float64(physics.mass))
     return Balance(

@@ -11,6 +11,7 @@ from stiffdice.dynamics.flat_bounce import restitution
 from stiffdice.dynamics.linear_theory import sag
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.scene.scene import from_mapping
+from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.run import simulate
 
 pytest.importorskip("stiffdice.simulation.engines.pybullet")
@@ -140,7 +141,9 @@ def test_the_path_of_a_free_flight_lags_as_it_is_said(model):
     states = run(scene, model, 100)
     place, speed = states["position"][:, 2], states["velocity"][:, 2]
     slope = (place[2:] - place[:-2]) / (2 * h)
-    np.testing.assert_allclose(slope, (speed + pybullet.LAG * np.diff(speed, prepend=np.nan))[1:-1], atol=1e-10)
+    np.testing.assert_allclose(
+        slope, (speed + stepper.lag("pybullet") * np.diff(speed, prepend=np.nan))[1:-1], atol=1e-10
+    )
     turns = model == "flying"
     spin = [0.3, 0.5, 0.2] if turns else [0, 0, 0]
     np.testing.assert_allclose(states["angular_momentum"], np.tile(spin, (100, 1)), atol=1e-13)
