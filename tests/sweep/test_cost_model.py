@@ -199,8 +199,8 @@ def test_a_large_grid_takes_no_more_operations_than_a_small_one():
         sys.setprofile(count)
         cost_model.of(plan, pieces)
         sys.setprofile(None)
-    assert calls[1] == calls[0]
-    assert calls[2] < calls[0] + 5 * 1000
+    assert calls[1] < calls[0] + 100  # what collects garbage meanwhile calls, too
+    assert calls[2] < calls[0] + 5 * 1000 + 100
 
 
 # Names of functions that processors round otherwise.
