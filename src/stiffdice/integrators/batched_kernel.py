@@ -26,7 +26,7 @@ from stiffdice.dynamics.models.tumbling import Tumbling
 from stiffdice.dynamics.models.vertical import Vertical
 from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.simd import load, store, where
-from stiffdice.dynamics.state import TURNING, Array, States
+from stiffdice.dynamics.state import TURNING, Array, Physics, States
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
 
@@ -436,15 +436,14 @@ def axes_of(scene: Scene) -> Array:
     return np.array([[1 + sign * x * x * a, sign * x * y * a, -sign * x], [x * y * a, sign + y * y * a, -y], [x, y, z]])
 
 
-def numbers_of(scene: Scene, h: float) -> Numbers:
-    """Return what a step of h [s] in a scene needs to know."""
-    mass, inertia = np.float64(scene.cube.mass), np.float64(scene.cube.moment_of_inertia)
-    ground = scene.ground
+def numbers_of(physics: Physics, axes: Array, h: float) -> Numbers:
+    """Return what a step of h [s] needs to know; axes: the ground's, shape (axis, 3)."""
+    mass, inertia = np.float64(physics.mass), np.float64(physics.inertia)
     with np.errstate(all="ignore"):  # at the extremes these leave the range of doubles, as the steps will
-        gain = (-h * scene.gravity * axes_of(scene)[:, 2]).tolist()
+        gain = Vector(*(-h * physics.gravity * axes[:, 2]).tolist())
         per_mass, per_inertia = float(h / mass), float(1.0 / inertia)
-    cutoff = 1e-6 * scene.cube.radius
-    return Numbers(h, ground.stiffness, ground.damping, -ground.friction, cutoff, per_mass, per_inertia, Vector(*gain))
+    slip, cutoff = -physics.friction, physics.cutoff
+    return Numbers(h, physics.stiffness, physics.damping, slip, cutoff, per_mass, per_inertia, gain)
 
 
 def flat(scene: Scene, launches: States) -> bool:

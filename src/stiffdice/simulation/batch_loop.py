@@ -348,7 +348,7 @@ def start(task: Task) -> Callable[[], bool] | None:
     if setup.scheme != SCHEME or model not in TOUCHING:
         return None
     axes, h = batched_kernel.axes_of(scene), setup.step_size
-    k, e = batched_kernel.numbers_of(scene, h), _balance(physics, axes, h, watched.sight)
+    k, e = batched_kernel.numbers_of(physics, axes, h), _balance(physics, axes, h, watched.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
     width = Alone() if len(task.ensemble) < FEWEST else batched_kernel.ABREAST[model]
