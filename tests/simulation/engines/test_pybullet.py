@@ -11,7 +11,6 @@ from stiffdice.dynamics.flat_bounce import restitution
 from stiffdice.dynamics.linear_theory import sag
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.run import simulate
 
 pytest.importorskip("stiffdice.simulation.engines.pybullet")
@@ -131,37 +130,6 @@ def test_friction_acts_at_the_node_and_points_somewhat_aside():
     change = (states["velocity"] - launch["velocity"])[0] / h + [0, 0, scene.gravity]
     np.testing.assert_allclose(change, felt, rtol=1e-4)
     np.testing.assert_allclose(states["angular_momentum"][0] / h, torque, rtol=1e-4, atol=1e-3)
-
-
-@pytest.mark.parametrize("model", ["flying", "sliding"])
-def test_the_path_of_a_free_flight_lags_as_it_is_said(model):
-    """u + LAG·(u − u_before) is the parabola's slope; nothing changes the spin, and the cube stays rigid."""
-    scene = scene_of({"stiffness": 1e4}, {"position": [0, 0, 50], **TUMBLE})
-    h = scene.duration / 100
-    states = run(scene, model, 100)
-    place, speed = states["position"][:, 2], states["velocity"][:, 2]
-    slope = (place[2:] - place[:-2]) / (2 * h)
-    np.testing.assert_allclose(
-        slope, (speed + stepper.lag("pybullet") * np.diff(speed, prepend=np.nan))[1:-1], atol=1e-10
-    )
-    turns = model == "flying"
-    spin = [0.3, 0.5, 0.2] if turns else [0, 0, 0]
-    np.testing.assert_allclose(states["angular_momentum"], np.tile(spin, (100, 1)), atol=1e-13)
-    reference = simulate(scene, model="tumbling" if turns else model, steps=100, every=1).trajectory.state[1:]
-    np.testing.assert_allclose(states["node_offset"], reference["node_offset"], atol=1e-12)
-
-
-def test_how_often_states_are_asked_for_does_not_change_them():
-    scene = scene_of({"stiffness": 1e4, "friction": 0.1}, TUMBLE, 1.0)
-    every_one = run(scene, "tumbling", 4200)
-    assert np.array_equal(run(scene, "tumbling", 4200, 7), every_one[6::7])
-    assert np.array_equal(run(scene, "tumbling", 4200, 2100), every_one[2099::2100])
-    engine = pybullet.Pybullet(scene, "tumbling", start_of(scene, "tumbling"), scene.duration / 4200, 1e-9)
-    first, second = np.zeros(3, STATE), np.zeros(2, STATE)
-    engine.advance(first, 1000)
-    engine.advance(second, 600)
-    assert np.array_equal(first, every_one[[999, 1999, 2999]])
-    assert np.array_equal(second, every_one[[3599, 4199]])
 
 
 def test_no_step_is_lost_in_a_division():
