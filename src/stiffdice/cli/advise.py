@@ -120,10 +120,10 @@ def _advise(options: argparse.Namespace) -> int:
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
-    from stiffdice.advice import report as advice_text
     from stiffdice.advice.check import check as checked
     from stiffdice.advice.check import run_advised
     from stiffdice.cli.progress import notes, progress
+    from stiffdice.report import advice_page
     from stiffdice.simulation.outcome import Verdict
 
     error = recommend.parsed_error(_in_radii(options.error, scene))
@@ -141,13 +141,13 @@ def _advise(options: argparse.Namespace) -> int:
 
             write_dataset(run_dataset(run), target)
     if options.json:
-        print(advice_text.as_json(given, check))
+        print(advice_page.as_json(given, check))
     else:
         for line in scene.derived:
             print(line)
-        print(advice_text.as_text(given, common.scene_words(options, changes) if options.scene else []))
+        print(advice_page.as_text(given, common.scene_words(options, changes) if options.scene else []))
         if check is not None:
-            print("\n" + advice_text.check_as_text(check))
+            print("\n" + advice_page.check_as_text(check))
             if target is not None:
                 print(printable(f"{target}: {Verdict(run.verdict[0]).sentence}"))
     return 0 if given.best is not None and (check is None or check.kept) else 1
