@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from stiffdice.cli import common
-
+HELP = "say whether two results differ, where, and by how much"
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-09.yaml -o listed.h5
@@ -23,18 +22,16 @@ are left out, unless --all is given.
 """
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    diff = common.add_command(
-        commands, "diff", _diff, "say whether two results differ, where, and by how much", EXAMPLES
-    )
+def add(diff: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
     diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
     diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")
     diff.add_argument("--json", action="store_true", help="the same for programs, and all of it")
 
 
-def _diff(options: argparse.Namespace) -> int:
+def call(options: argparse.Namespace) -> int:
+    """Print what differs; 1 if anything does."""
     from stiffdice.archive.compare.compare import compare
 
     found = compare(options.a, options.b, all_files=options.all)
