@@ -154,7 +154,7 @@ def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
     assert (kept / REBUILT / "results/tiny/same.txt").read_text() == "same"
     assert (kept / ARCHIVED / "results/tiny/same.txt").read_text() == "same but for this"
     assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 2
-    assert "is not empty" in capsys.readouterr().err
+    assert "File exists; name a new folder" in capsys.readouterr().err
 
 
 @pytest.mark.workflow

@@ -44,13 +44,6 @@ _FORMATS = {
     ".toml": "application/toml",
     ".yaml": "application/yaml",
 }
-_FOLDERS = {
-    "config": "The studies, and the scenes that they name",
-    "docs": "How things are measured, what was found, and what is in the files",
-    "requirements": "Every package in its version, with digests: what .venv is made from",
-    "src/stiffdice": "The library: the simulator, its judgement, its figures",
-    "workflow": "Rules, scripts and schema of the workflow",
-}
 # Files of the project that are described one by one, besides the study's and README.md, which is about the whole.
 _FILES = ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md")
 _HOMEPAGES = {"octave": "https://octave.org"}  # of what is not on PyPI
@@ -148,8 +141,6 @@ class _Crate:
         for path in _FILES:
             self._file(path)
         self._file("README.md", about=root)
-        for path, description in _FOLDERS.items():
-            self._folder(path, description)
         self._add(_NETCDF, "WebSite", name="netCDF-4 on HDF5")
         told = {"name": manifest.NAME, "encodingFormat": "text/plain"}
         told["description"] = "The SHA-256 of every file but itself: sha256sum --check"

@@ -15,10 +15,8 @@ examples:
   cp -r results/quick before
   stiffdice diff before results/quick --json
 
-The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. A unit in the last place
-(ulp) is the step from one double to the next. The shards of a sweep are compared cell by cell, however the cells are
-dealt to them. Logs, times, reports, and figures and tables that show times differ from one rebuild to the next; they
-are left out, unless --all is given.
+The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. Logs, times, and what shows
+times differ from one rebuild to the next; they are left out, unless --all is given. docs/diff.md says more.
 """
 
 

@@ -24,10 +24,9 @@ examples:
   stiffdice rebuild results/archives/quick-{__version__}.crate.zip
   stiffdice rebuild results/archives/quick-{__version__}.crate.zip --cores 4 -o again
 
-Where the archive's code is the installed code, file by file, nothing of a stranger's is executed, and nothing asked.
-Other code is the archive's own: it says so, asks, and runs that in a sandbox (bubblewrap), or not at all. The archive
-is checked first, and not run if anything in it fails. Exit status: 0 if all data and figures are the same, 1 if some
-differ, 2 if the archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
+The archive is checked first. Its own code, where that is not the installed code, file by file, is run after asking, in
+a sandbox (bubblewrap), or not at all. Exit status: 0 if all data and figures are the same, 1 if some differ, 2 if the
+archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
 """
 
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both
