@@ -115,9 +115,6 @@ def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources:
         return target
     if any(target.samefile(source) for source in sources):
         raise InputError(f"{target}: is the scene itself; name another file for the output")
-    try:
-        if force or target.stat().st_size == 0 or is_ours(target):
-            return target
-    except OSError as error:
-        raise InputError(f"{target}: {error.strerror}") from None
+    if force or target.stat().st_size == 0 or is_ours(target):
+        return target
     raise InputError(f"{target}: is there already, and no such file of stiffdice; name another, or add --force")

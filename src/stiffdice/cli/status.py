@@ -41,13 +41,21 @@ def add(status: argparse.ArgumentParser) -> None:
 
 
 def call(options: argparse.Namespace) -> int:
-    """Print how far the study is, once or again and again."""
+    """Print how far the study is; with --watch again, until all is done, or the run seen at work has ended."""
+    from stiffdice.study.status import State
+
     options.cores = None if options.cores is None else common.whole("--cores", options.cores)
-    if options.watch:
-        return _watch(options)
-    found = _found(options)
-    _tell(found, options)
-    return _exit_status(found)
+    ended, quiet, seen = 3, 0, False
+    with contextlib.suppress(KeyboardInterrupt) if options.watch else contextlib.nullcontext():
+        while True:
+            found = _found(options)
+            _tell(found, options)
+            running = any(status.those(State.RUNNING) for status in found)
+            seen, quiet, ended = seen or running, 0 if running else quiet + 1, _exit_status(found)
+            if not options.watch or (quiet >= QUIET if seen else ended == 0):
+                break
+            time.sleep(SECONDS)
+    return ended
 
 
 def _found(options: argparse.Namespace) -> list[Status]:
@@ -66,6 +74,10 @@ def _found(options: argparse.Namespace) -> list[Status]:
 def _tell(found: list[Status], options: argparse.Namespace) -> None:
     from stiffdice.study import status_report
 
+    if options.watch and sys.stdout.isatty():
+        print("\x1b[H\x1b[J", end="")
+    elif options.watch and not options.json:
+        print()
     if options.json:
         data = [status_report.as_data(status) for status in found]
         indent = None if options.watch else 2  # a line for each look
@@ -84,29 +96,3 @@ def _exit_status(found: list[Status]) -> int:
     if State.FAILED in states:
         return 1
     return 0 if states == {State.DONE} else 3
-
-
-def _watch(options: argparse.Namespace) -> int:
-    """Tell again and again, until all is done, or the run that was seen at work has ended, or Ctrl-C."""
-    from stiffdice.study.status import State
-
-    ended, quiet, seen = 3, 0, False
-    with contextlib.suppress(KeyboardInterrupt):
-        while True:
-            found = _found(options)
-            _clear(options)
-            _tell(found, options)
-            running = any(status.those(State.RUNNING) for status in found)
-            seen, quiet, ended = seen or running, 0 if running else quiet + 1, _exit_status(found)
-            if quiet >= QUIET if seen else ended == 0:
-                break
-            time.sleep(SECONDS)
-    return ended
-
-
-def _clear(options: argparse.Namespace) -> None:
-    """Begin at the top of an empty screen, or after an empty line."""
-    if sys.stdout.isatty():
-        print("\x1b[H\x1b[J", end="")
-    elif not options.json:
-        print()

@@ -161,7 +161,7 @@ def rewritten(path, run, **values):
 def test_equal_files_are_the_same(pair):
     found = compare(*pair)
     assert found.same
-    assert found.lines() == ["the same, byte for byte"]
+    assert found.lines() == ["the same, byte for byte: 1 file"]
 
 
 def test_one_bit_is_found(pair, run):
@@ -177,9 +177,10 @@ def test_one_bit_is_found(pair, run):
     assert values.ulp == 1
     assert values.absolute == pytest.approx(np.spacing(value))
     lines = found.lines()
-    assert lines[0].startswith("different: numbers (up to 1 ulp, ")
-    assert lines[1].startswith("position: 1 of 303 values differ, by up to 1 ulp, ")
-    assert lines[2] == f"  at time = 2.5 s, axis z: {place.a} against {place.b}"
+    assert lines[0].startswith("different: numbers in 1 file (up to 1 ulp, ")
+    assert lines[1:3] == ["", "a.h5"]
+    assert lines[3].startswith("  position: 1 of 303 values differ, by up to 1 ulp, ")
+    assert lines[4] == f"    at time = 2.5 s, axis z: {place.a} against {place.b}"
 
 
 def test_kinds_are_told_in_words(pair, run):
@@ -220,16 +221,18 @@ def test_equal_numbers_are_told_although_attributes_differ(pair, run):
     found = compare(*pair)
     assert (found.same, found.numbers_same) == (False, True)
     lines = found.lines()
-    assert lines[0] == "the numbers are the same; different: attributes"
-    assert {line.partition(":")[0] for line in lines[1:]} == {
+    assert lines[0] == "the numbers are the same; different: attributes in 1 file"
+    assert {line.partition(":")[0] for line in lines[1:] if line} == {
         "code_digest",
         "scene_digest",
         "title",
         "position.units",
         "scene.ground.stiffness",
     }
-    assert {"position.units: m against cm", "scene.ground.stiffness: 10000.0 against 5.0"} < set(lines)
-    assert lines[-1] == "title: only in A: A thrown cube"
+    assert {"position.units: m against cm (1 file)", "scene.ground.stiffness: 10000.0 against 5.0 (1 file)"} < set(
+        lines
+    )
+    assert lines[-1] == "title: only in A: A thrown cube (1 file)"
 
 
 def test_readers_do_not_read_a_difference_into_a_single_number(pair):
@@ -244,7 +247,7 @@ def test_other_storage_is_no_difference(pair, run):
     seal.seal(pair[1])
     found = compare(*pair)
     assert found.same
-    assert found.lines() == ["the same numbers and attributes, stored otherwise"]
+    assert found.lines() == ["the same numbers and attributes, stored otherwise: 1 file, 0 of them byte for byte"]
 
 
 def test_variables_types_and_sizes_are_told(pair, run):
@@ -253,11 +256,11 @@ def test_variables_types_and_sizes_are_told(pair, run):
     found = compare(*pair)
     assert not found.numbers_same
     lines = found.lines()
-    assert lines[0] == "different: variables, types or sizes"
-    assert "energy_paper: only in A: f8, 101 time" in lines
-    assert "step: i8, 101 time against i4, 50 time" in lines
-    assert "position: f8, 101 time, 3 axis against f8, 50 time, 3 axis" in lines
-    assert "compared at the 50 places along time that both have" in lines
+    assert lines[0] == "different: variables, types or sizes in 1 file"
+    assert "  energy_paper: only in A: f8, 101 time" in lines
+    assert "  step: i8, 101 time against i4, 50 time" in lines
+    assert "  position: f8, 101 time, 3 axis against f8, 50 time, 3 axis" in lines
+    assert "  compared at the 50 places along time that both have" in lines
 
 
 def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
@@ -265,9 +268,9 @@ def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
     thinned["position"].values[25, 2] = 7.0
     write_dataset(thinned, pair[1])
     lines = compare(*pair).lines()
-    assert "compared at the 51 places along time that both have" in lines
-    assert any(line.startswith("position: 1 of 153 values differ") for line in lines)
-    assert any(line.startswith("  at time = 5 s, axis z: ") for line in lines)
+    assert "  compared at the 51 places along time that both have" in lines
+    assert any(line.startswith("  position: 1 of 153 values differ") for line in lines)
+    assert any(line.startswith("    at time = 5 s, axis z: ") for line in lines)
 
 
 def test_json_has_all(pair, run):
@@ -433,9 +436,9 @@ def test_edges_that_moved_are_told_by_law_and_stiffness(tmp_path, small):
     for name, dataset in (("a.h5", found), ("b.h5", moved)):
         write_dataset(dataset, tmp_path / name)
     lines = compare(tmp_path / "a.h5", tmp_path / "b.h5").lines()
-    assert lines[1].startswith("steps_needed: 1 of ") and "by up to " in lines[1] and ", 3" in lines[1]
+    assert lines[3].startswith("  steps_needed: 1 of ") and "by up to " in lines[3] and ", 3" in lines[3]
     needed = float(found["steps_needed"].values[place])
-    assert lines[2].endswith(f": {needed} against {needed + 3}") and "stiffness = " in lines[2]
+    assert lines[4].endswith(f": {needed} against {needed + 3}") and "stiffness = " in lines[4]
 
 
 @pytest.fixture
@@ -548,11 +551,11 @@ def diff(capsys):
 
 
 def test_exit_statuses(diff, pair, run):
-    assert diff(*pair) == (0, "the same, byte for byte\n", "")
+    assert diff(*pair) == (0, "the same, byte for byte: 1 file\n", "")
     rewritten(pair[1], run, position=((25, 2), 7.0))
     status, out, err = diff(*pair)
     assert (status, err) == (1, "")
-    assert out.startswith("different: numbers (up to ")
+    assert out.startswith("different: numbers in 1 file (up to ")
     status, out, err = diff(*pair, "--json")
     assert (status, json.loads(out)["same"], err) == (1, False, "")
 

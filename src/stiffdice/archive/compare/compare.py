@@ -45,7 +45,7 @@ def compare(a: Path, b: Path, all_files: bool = False) -> Comparison:
             return _folders(folders.read("A", left), folders.read("B", right), all_files)
         difference = _data_difference(left.name, [open_file(left)], [open_file(right)])
         identical = int(filecmp.cmp(left, right, shallow=False))
-    return Comparison(() if difference.same else (difference,), files=1, identical=identical, single=True)
+    return Comparison(() if difference.same else (difference,), files=1, identical=identical)
 
 
 def _unpacked(path: Path, stack: ExitStack) -> Path:

@@ -32,8 +32,7 @@ class Comparison:
     """What differs between A and B.
 
     differences: of the files that both have and that are not the same. only_a, only_b: files that one has. left_out:
-    side files. files: how many were compared, identical: how many of them byte for byte the same. single: whether A
-    and B are files, not folders.
+    side files. files: how many were compared, identical: how many of them byte for byte the same.
     """
 
     differences: tuple[Difference, ...] = ()
@@ -42,7 +41,6 @@ class Comparison:
     left_out: tuple[str, ...] = ()
     files: int = 0
     identical: int = 0
-    single: bool = False
 
     @property
     def same(self) -> bool:
@@ -61,10 +59,7 @@ class Comparison:
         for side, names in (("A", self.only_a), ("B", self.only_b)):
             lines += _first([f"only in {side}: {name}" for name in names], "files")
         for part in self.differences[:SHOWN]:
-            about = list(_about(part))
-            if self.single:
-                lines += about
-            elif about:
+            if about := list(_about(part)):
                 lines += ["", part.name, *(f"  {line}" for line in about)]
         lines += _more(len(self.differences) - SHOWN, "files")
         if self.left_out:
@@ -78,18 +73,17 @@ class Comparison:
         if not self.same:
             different = f"different: {', '.join(self._how_different())}"
             return f"the numbers are the same; {different}" if self.numbers_same else different
+        files = _count(self.files, "file")
         if self.identical == self.files:
-            return "the same, byte for byte" + ("" if self.single else f": {_count(self.files, 'file')}")
-        how = "" if self.single else f": {_count(self.files, 'file')}, {self.identical} of them byte for byte"
-        return f"the same numbers and attributes, stored otherwise{how}"
+            return f"the same, byte for byte: {files}"
+        return f"the same numbers and attributes, stored otherwise: {files}, {self.identical} of them byte for byte"
 
     def _how_different(self) -> Iterator[str]:
         """Yield what differs, the gravest first, and in how many files."""
         for field, what in _KINDS.items():
             number = sum(bool(getattr(part, field)) for part in self.differences)
             if number:
-                where = "" if self.single else f" in {_count(number, 'file')}"
-                yield f"{what}{where}{_up_to(self.differences) if field == 'values' else ''}"
+                yield f"{what} in {_count(number, 'file')}{_up_to(self.differences) if field == 'values' else ''}"
         for side, names in (("A", self.only_a), ("B", self.only_b)):
             if names:
                 yield f"{_count(len(names), 'file')} only in {side}"
@@ -99,8 +93,7 @@ class Comparison:
         found = Counter(aspect for part in self.differences for aspect in part.attributes)
         # What only one of the two says is often only newer.
         ordered = sorted(found.items(), key=lambda item: (None in (item[0].a, item[0].b), -item[1]))
-        lines = [_against(one) + ("" if self.single else f" ({_count(count, 'file')})") for one, count in ordered]
-        return _first(lines, "attributes")
+        return _first([f"{_against(one)} ({_count(count, 'file')})" for one, count in ordered], "attributes")
 
     def as_json(self) -> str:
         """Return all of it as JSON, with text for the numbers that JSON does not have."""
