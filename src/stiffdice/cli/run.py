@@ -82,7 +82,7 @@ def call(options: argparse.Namespace) -> None:
         every = validation.count("every", common.whole("--every", options.every), at_most=steps)
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
-    for line in run_page.doubts(scene, setup.model, setup.own_scheme or "", steps):
+    for line in run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps):
         print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
     with progress() as show:
         run = simulate(
