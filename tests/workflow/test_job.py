@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -14,19 +15,26 @@ import pytest
 from stiffdice.study import job_log
 
 SCRIPTS = Path(__file__).parents[2] / "workflow" / "scripts"
-# Snakemake puts such an object, and the folder of the script, before what the script says.
-BEFORE = f"""
+# Snakemake runs a script with such an object, from the folder of the script.
+BEGIN = f"""
 import sys, types
-sys.path.insert(0, {str(SCRIPTS)!r})
-snakemake = types.SimpleNamespace(log=sys.argv[1:], output=sys.argv[2:], params=types.SimpleNamespace(asked="scene 0"))
-snakemake.log = snakemake.log[:1]
-from job import logged
+sys.path[:0] = [{str(SCRIPTS)!r}, sys.argv[1]]
+from job import begin
+begin(types.SimpleNamespace(
+    script="work.py", rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
+    params=types.SimpleNamespace(asked="scene 0"),
+))
 """
-IN_BLOCK = "with logged() as say:\n    "
+
+
+IN_BLOCK = "def make(job, say):\n    "
 
 
 def script(*lines: str, log) -> list[str]:
-    return [sys.executable, "-c", BEFORE + "\n".join(lines), str(log)]
+    """Return the command of a job that does what the lines say: some in `make`, some before it."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "work.py").write_text("\n".join(lines))
+    return [sys.executable, "-c", BEGIN, str(folder), str(log)]
 
 
 def run(*lines: str, log) -> subprocess.CompletedProcess[str]:
@@ -102,14 +110,14 @@ def test_a_signal_is_the_last_word_if_it_leaves_time_for_one(tmp_path, number, s
 
 
 def test_no_room_for_the_log_does_not_stop_a_job(tmp_path):
-    ended = run(IN_BLOCK + "say('simulation: 1.000 s')", "print('made')", log="/dev/full")
+    ended = run(IN_BLOCK + "say('simulation: 1.000 s'); print('made', flush=True)", log="/dev/full")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "made\n", "")
     ended = run(IN_BLOCK + OURS, log="/dev/full")
     assert (ended.returncode, ended.stderr) == (2, "stiffdice: /dev/full: failed: x.h5: no room\n")
 
 
 def test_a_log_that_cannot_be_opened_is_one_line(tmp_path):
-    ended = run("print('made')", log=tmp_path)
+    ended = run(IN_BLOCK + "print('made')", log=tmp_path)
     assert ended.returncode == 1
     assert (ended.stdout, ended.stderr) == ("", f"stiffdice: {tmp_path}: Is a directory\n")
 

@@ -1,17 +1,23 @@
 """Find the edges of stability in a collected sweep."""
 
-from typing import Any
+from __future__ import annotations
 
-from inputs import opened
-from job import logged
+from job import Job, Say, begin
 
-from stiffdice.io.writer import write_bytes, write_dataset
-from stiffdice.sweep import stability_limits
 
-snakemake: Any  # Snakemake puts it here
+def make(job: Job, say: Say) -> None:
+    """Store the edges as data and as a table."""
+    from inputs import opened
 
-with logged() as say:
-    found = stability_limits.find(opened(snakemake.input.items(), say)["sweep"])
-    write_dataset(found, snakemake.output.data)
-    write_bytes(stability_limits.table(found).encode(), snakemake.output.table)
+    from stiffdice.io.writer import write_bytes, write_dataset
+    from stiffdice.sweep import stability_limits
+
+    found = stability_limits.find(opened(job.input.items(), say)["sweep"])
+    data, table = job.output
+    write_dataset(found, data)
+    write_bytes(stability_limits.table(found).encode(), table)
     say(f"{found.sizes['stiffness']} stiffnesses, {found.sizes['criterion']} criteria")
+
+
+if __name__ == "__main__":
+    begin(globals()["snakemake"])
