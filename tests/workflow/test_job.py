@@ -20,8 +20,8 @@ BEGIN = f"""
 import sys, types
 sys.path[:0] = [{str(SCRIPTS)!r}, sys.argv[1]]
 from job import begin
-begin(types.SimpleNamespace(
-    script="work.py", rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
+begin("work.py", types.SimpleNamespace(
+    rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
     params=types.SimpleNamespace(asked="scene 0"),
 ))
 """

@@ -1,7 +1,5 @@
 """Collect shards into one sweep of judged cells, with a table that says what is in which; or those of some rounds."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +25,7 @@ def make(job: Job, say: Say) -> None:
     say(f"{len(lines) - 1} shards collected")
 
 
-def _checked(job: Job, lines: list[str], say: Say) -> Iterator[xr.Dataset]:
+def _checked(job: Job, lines: list[str], say: Say) -> "Iterator[xr.Dataset]":
     """Read one shard after another, part by part, and note what is in it; one that is not as planned is refused."""
     from inputs import Inputs, opened
 
@@ -64,4 +62,4 @@ def _row(name: str, number: int, members: int, stiffness: list[float], steps: li
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

@@ -1,7 +1,5 @@
 """Draw one figure."""
 
-from __future__ import annotations
-
 from job import Job, Say, begin
 
 
@@ -17,4 +15,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

@@ -1,7 +1,5 @@
 """Find the edges of stability in a collected sweep."""
 
-from __future__ import annotations
-
 from job import Job, Say, begin
 
 
@@ -20,4 +18,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

@@ -62,11 +62,11 @@ class Job(NamedTuple):
         return pickle.loads(self.planned) if self.planned else None
 
 
-def begin(snakemake: Any) -> NoReturn:
+def begin(script: str, snakemake: Any) -> NoReturn:
     """Have a job done: by the warm process if there is one, else here. Ends this process with the job's status."""
     params = snakemake.params
     job = Job(
-        Path(snakemake.script).stem,
+        Path(script).stem,
         snakemake.rule,
         dict(snakemake.wildcards.items()),
         {name: files if isinstance(files, str) else list(files) for name, files in snakemake.input.items()},

@@ -1,7 +1,5 @@
 """Make one experiment or one timing, and store what it found."""
 
-from __future__ import annotations
-
 from job import Job, Say, Stopwatch, begin
 
 
@@ -29,4 +27,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

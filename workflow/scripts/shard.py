@@ -1,7 +1,5 @@
 """Compute one shard and store its runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from job import Job, Say, Stopwatch, begin, tenths
@@ -33,4 +31,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

@@ -1,7 +1,5 @@
 """Tell what sweeps or experiments found as a table, for people and for programs."""
 
-from __future__ import annotations
-
 from job import Job, Say, begin
 
 
@@ -21,4 +19,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

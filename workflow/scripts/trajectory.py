@@ -1,7 +1,5 @@
 """Run one scene and store its trajectory, with its energy budget."""
 
-from __future__ import annotations
-
 from job import Job, Say, Stopwatch, begin
 
 
@@ -35,4 +33,4 @@ def make(job: Job, say: Say) -> None:
 
 
 if __name__ == "__main__":
-    begin(globals()["snakemake"])
+    begin(__file__, globals()["snakemake"])

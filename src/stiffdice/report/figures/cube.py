@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from stiffdice.dynamics.state import Array
 from stiffdice.report.figures import style
-from stiffdice.report.figures.registry import FRAMES_PER_SECOND
+from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
 from stiffdice.report.number_format import describe, scene_of
 from stiffdice.scene.cube import LINKS
 
@@ -33,7 +32,7 @@ def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
 start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
 
 
-def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
+def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
     """Return the whole run in real time."""
     run = next(iter(runs.values()))
     figure, axes = _room(run, title)
@@ -51,7 +50,7 @@ def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
         clock.set_text(f"t = {float(run.time[index]):4.1f} s")
         return [edges, trace, clock]
 
-    return FuncAnimation(figure, show, frames=count)
+    return Animation(figure, show, count)
 
 
 def _links(run: xr.Dataset, index: int) -> Array:
