@@ -1,9 +1,13 @@
-"""What a job's log says, however the job ends: scripts as Snakemake runs them, but without Snakemake."""
+"""What a job's log says, however the job ends: scripts as Snakemake runs them, but without Snakemake.
+
+Each test is done twice: by a script that does its job itself, and by one that hands it over to the warm process.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -18,16 +22,41 @@ SCRIPTS = Path(__file__).parents[2] / "workflow" / "scripts"
 # Snakemake runs a script with such an object, from the folder of the script.
 BEGIN = f"""
 import sys, types
-sys.path[:0] = [{str(SCRIPTS)!r}, sys.argv[1]]
+sys.path.insert(0, {str(SCRIPTS)!r})
 from job import begin
-begin("work.py", types.SimpleNamespace(
+begin(f"{{sys.argv[1]}}/work.py", types.SimpleNamespace(
     rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
     params=types.SimpleNamespace(asked="scene 0"),
 ))
 """
 
 
+WARM = SCRIPTS.parent / "warm.py"
 IN_BLOCK = "def make(job, say):\n    "
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """Where a warm process listens; it ends after the tests of this file."""
+    place = str(tmp_path_factory.mktemp("warm") / "socket")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(place)
+        listener.listen()
+        handle = listener.fileno()
+        process = subprocess.Popen([sys.executable, str(WARM), str(handle)], pass_fds=[handle])
+    yield place
+    process.kill()
+    process.wait()
+
+
+@pytest.fixture(autouse=True, params=["alone", "handed over"])
+def how(request, monkeypatch):
+    """Whether a script does its job itself."""
+    if request.param == "alone":
+        monkeypatch.delenv("STIFFDICE_WARM", raising=False)
+    else:
+        monkeypatch.setenv("STIFFDICE_WARM", request.getfixturevalue("address"))
+    return request.param
 
 
 def script(*lines: str, log) -> list[str]:

@@ -42,7 +42,7 @@ class Sealed:
 class Job(NamedTuple):
     """A job as plain data.
 
-    script: the module that does it. rule, wildcards, input, output, log: Snakemake's; input and output by name, those
+    script: the file that does it, by its `make`. rule, wildcards, input, output, log: Snakemake's; input and output by name, those
     without a name left out. asked: what its result follows from, for the log. planned: what the study's file says of
     it, pickled, as unpickling imports what takes long. dpi: of a figure.
     """
@@ -66,7 +66,7 @@ def begin(script: str, snakemake: Any) -> NoReturn:
     """Have a job done: by the warm process if there is one, else here. Ends this process with the job's status."""
     params = snakemake.params
     job = Job(
-        Path(script).stem,
+        script,
         snakemake.rule,
         dict(snakemake.wildcards.items()),
         {name: files if isinstance(files, str) else list(files) for name, files in snakemake.input.items()},
@@ -121,7 +121,9 @@ def carry_out(job: Job) -> NoReturn:
     sys.unraisablehook = lambda what: log.say(f"in passing: {what.exc_value}".splitlines()[0])
     try:
         _clear(job)
-        importlib.import_module(job.script).make(job, log.say)
+        script = Path(job.script)
+        sys.path.insert(0, str(script.parent))
+        importlib.import_module(script.stem).make(job, log.say)
     except BaseException as error:
         log.end(error)
     log.done(job)
