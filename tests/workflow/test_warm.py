@@ -21,7 +21,8 @@ import sys, types
 sys.path.insert(0, {str(WORKFLOW / "scripts")!r})
 from job import begin
 begin(sys.argv[1], types.SimpleNamespace(
-    rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]], params=types.SimpleNamespace(asked="scene 0"),
+    rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
+    params=types.SimpleNamespace(asked="scene 0"),
 ))
 """
 

@@ -42,9 +42,9 @@ class Sealed:
 class Job(NamedTuple):
     """A job as plain data.
 
-    script: the file that does it, by its `make`. rule, wildcards, input, output, log: Snakemake's; input and output by name, those
-    without a name left out. asked: what its result follows from, for the log. planned: what the study's file says of
-    it, pickled, as unpickling imports what takes long. dpi: of a figure.
+    script: the file whose `make` does it. rule, wildcards, input, output, log: Snakemake's; input by name. asked: what
+    its result follows from, for the log. planned: what the study's file says of it, pickled, as unpickling imports
+    what takes long. dpi: of a figure.
     """
 
     script: str
