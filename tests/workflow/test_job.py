@@ -74,10 +74,11 @@ def test_a_job_that_does_what_it_should(tmp_path):
     log = tmp_path / "log"
     ended = run(IN_BLOCK + "say('simulation: 1.000 s')", log=log)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
-    first, asked, said, last = log.read_text().splitlines()
+    first, asked, said, memory, last = log.read_text().splitlines()
     assert first.startswith("begun 20")
     assert asked == "asked: scene 0"
     assert said == "simulation: 1.000 s"
+    assert 10 < int(memory.removeprefix("memory: ").removesuffix(" MB")) < 10_000
     assert last.startswith("done in ")
     assert job_log.read(log).ending == "done"
 
@@ -159,7 +160,7 @@ def test_progress_is_told_by_tenths(tmp_path):
         "    for k in range(1000): tell((k + 1) / 1000)",
         log=log,
     )
-    assert log.read_text().splitlines()[2:-1] == [f"{k}0% of the steps done" for k in range(1, 11)]
+    assert log.read_text().splitlines()[2:-2] == [f"{k}0% of the steps done" for k in range(1, 11)]
     assert job_log.read(log).progress == 1
 
 

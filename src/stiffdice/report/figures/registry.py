@@ -55,7 +55,7 @@ def _gif(animation: Animation, dpi: int) -> bytes:
     """Return a GIF of frames for which what does not move is drawn once."""
     figure = animation.figure
     figure.set_dpi(dpi)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     for artist in animation.show(0):
         artist.set_animated(True)
     canvas.draw()
