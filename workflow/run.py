@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import socket
 import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 STAGES = (
@@ -17,11 +21,12 @@ STAGES = (
 ROOT = Path(__file__).resolve().parent.parent
 
 # The library of this checkout, as the jobs have it.
-sys.path.insert(0, str(ROOT / "src"))
+sys.path[:0] = [str(ROOT / "src"), str(ROOT / "workflow" / "scripts")]
 
 import ending  # noqa: E402
 import lock  # noqa: E402
 import room  # noqa: E402
+from job import ADDRESS  # noqa: E402
 
 from stiffdice.errors import printable  # noqa: E402
 from stiffdice.study import job_log  # noqa: E402
@@ -98,6 +103,33 @@ def tied() -> None:
     end_with_parent("run.py")
 
 
+@contextmanager
+def warm(environment: dict[str, str], named: bool) -> Iterator[dict[str, str]]:
+    """Yield the environment in which jobs find a process that has imported what they need, and end it afterwards.
+
+    named: a profile of the user's own, whose jobs may run elsewhere. Without the process jobs do all by themselves.
+    """
+    if named or not hasattr(os, "pidfd_open"):
+        yield environment
+        return
+    with tempfile.TemporaryDirectory(prefix="stiffdice-") as folder, socket.socket(socket.AF_UNIX) as listener:
+        address = f"{folder}/warm"
+        try:
+            listener.bind(address)
+        except OSError:  # too long a path
+            yield environment
+            return
+        listener.listen()  # from here on who comes waits
+        command = [sys.executable, "workflow/warm.py", str(listener.fileno())]
+        handles = [listener.fileno()]
+        process = subprocess.Popen(command, cwd=ROOT, env=environment, pass_fds=handles, start_new_session=True)
+        try:
+            yield environment | {ADDRESS: address}
+        finally:
+            process.kill()
+            process.wait()
+
+
 def rounds(command: list[str], environment: dict[str, str], studies: list[str]) -> int:
     """Run Snakemake, and again while jobs set damaged results aside, so that these are made; return its exit status."""
     made_again: dict[str, str] = {}
@@ -140,7 +172,8 @@ def main() -> int:
     for line in told:
         print(f"stiffdice: {printable(line)}", file=sys.stderr)
     try:
-        status = rounds(command, os.environ | changes, studies)
+        with warm(os.environ | changes, named) as environment:
+            status = rounds(command, environment, studies)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130

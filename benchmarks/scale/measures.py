@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,14 +16,14 @@ from stiffdice.study.eta import took
 
 # What jobs' logs tell.
 _SIMULATION, _CELLS = r"^simulation: ([0-9.]+) s$", r"^(\d+) cells, \d+ runs$"
-_KEPT = r"^of these, (\d+) cells kept "
+_KEPT, _MEMORY = r"^of these, (\d+) cells kept ", r"^memory: (\d+) MB$"
 
 # Stages that bring shards together.
 _COLLECTING = ("collect", "survey")
 
 
 class Job(NamedTuple):
-    """One job that ended well, of a stage: wall time [s], of that in the simulator [s], peak memory [B] if it was seen.
+    """One job that ended well, of a stage: wall time [s], of that in the simulator [s], peak memory [B].
 
     cells: in its shard, and of these kept from other shards; both 0 of any other job.
     """
@@ -33,7 +32,7 @@ class Job(NamedTuple):
     name: str
     seconds: float
     simulation: float
-    peak: float | None
+    peak: float
     cells: int
     kept: int
 
@@ -43,8 +42,8 @@ class Grown(NamedTuple):
 
     runs, cells: collected. jobs: of all stages. shards: of them. cores, wall [s]: of the workflow from start to end, in
     `sessions` calls. simulation, in_jobs [s]: added up over jobs. longest [s]: of shards' jobs; balance: of one
-    sweep's, over their median, where that is worst. shard_peak, collect_peak [B]: largest of any; NaN if nobody looked
-    in time. collecting [s]. shard_bytes, bytes, files: of results, logs and benchmarks apart. sweep_bytes: of sweep.h5.
+    sweep's, over their median, where that is worst. shard_peak, collect_peak [B]: largest of any; NaN without a job.
+    collecting [s]. shard_bytes, bytes, files: of results, logs and benchmarks apart. sweep_bytes: of sweep.h5.
     dag, verify (wall and processor time [s]; peak memory [B]): of a dry run before it began, of a check of all results.
     """
 
@@ -85,8 +84,8 @@ def jobs_of(study: Study, top: Path, since: float = 0.0) -> list[Job]:
         seconds = took(benchmark)
         if seconds is not None and benchmark.stat().st_mtime >= since:
             text = (top / result.log).read_text(encoding="utf-8")
-            told = [_first(pattern, text) for pattern in (_SIMULATION, _CELLS, _KEPT)]
-            found.append(Job(result.stage, result.name, seconds, told[0], _peak(benchmark), int(told[1]), int(told[2])))
+            told = [_first(pattern, text) for pattern in (_SIMULATION, _CELLS, _KEPT, _MEMORY)]
+            found.append(Job(result.stage, result.name, seconds, told[0], told[3] * 1e6, int(told[1]), int(told[2])))
     return found
 
 
@@ -94,16 +93,6 @@ def _first(pattern: str, log: str) -> float:
     """Return the number that a log tells; 0 if it says nothing of it."""
     said = re.search(pattern, log, re.MULTILINE)
     return float(said[1]) if said else 0.0
-
-
-def _peak(benchmark: Path) -> float | None:
-    """Return the memory that Snakemake saw a job hold [B], None if the job was over before it looked."""
-    with benchmark.open(encoding="utf-8", newline="") as file:
-        (row,) = csv.DictReader(file, delimiter="\t")
-    try:
-        return float(row["max_rss"]) * 2**20
-    except ValueError:
-        return None
 
 
 def wall_of(sessions: Sequence[Session], top: Path) -> float:
@@ -156,7 +145,7 @@ def _balance(jobs: Sequence[Job]) -> float:
 
 
 def _largest(jobs: Iterable[Job]) -> float:
-    return max((job.peak for job in jobs if job.peak is not None), default=float("nan"))
+    return max((job.peak for job in jobs), default=float("nan"))
 
 
 def _bytes(paths: Iterable[Path]) -> int:

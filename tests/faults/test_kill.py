@@ -67,7 +67,7 @@ class Killer:
             start_new_session=True,
         )
         kind = "job"
-        while kind == "job":  # one job's end is not that of the others
+        while kind in ("job", "warm process"):  # one job's end is not that of the others
             try:
                 return started.wait(self._rng.uniform(0, STARTING + self._pace * self._missing(project)))
             except subprocess.TimeoutExpired:
@@ -81,14 +81,24 @@ class Killer:
         everything = [top, *top.children(recursive=True)]
         parts = {"all": everything, by: [top]}
         for process in everything[1:]:
-            parts["job" if any(".snakemake/scripts" in word for word in _words(process)) else "snakemake"] = [process]
+            parts[_kind(process)] = [process]
         kind = str(self._rng.choice(sorted(parts)))
         for process in parts[kind]:
             _end(process)
-        if kind != "job" and sys.platform == "linux":
+        if kind not in ("job", "warm process") and sys.platform == "linux":
             _, alive = psutil.wait_procs(everything[1:], timeout=60)
             assert not alive, f"{alive} outlived {kind}"
         return kind
+
+
+def _kind(process: psutil.Process) -> str:
+    """Return what a process is: of jobs that are handed over both the script and the child that does it are one."""
+    words, above = _words(process), process.parent()
+    if any(".snakemake/scripts" in word for word in words):
+        return "job"
+    if any("warm.py" in word for word in words):
+        return "job" if above and any("warm.py" in word for word in _words(above)) else "warm process"
+    return "snakemake"
 
 
 def _words(process: psutil.Process) -> list[str]:

@@ -1,11 +1,16 @@
-"""What a job's log says, however the job ends: scripts as Snakemake runs them, but without Snakemake."""
+"""What a job's log says, however the job ends: scripts as Snakemake runs them, but without Snakemake.
+
+Each test is done twice: by a script that does its job itself, and by one that hands it over to the warm process.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -14,19 +19,51 @@ import pytest
 from stiffdice.study import job_log
 
 SCRIPTS = Path(__file__).parents[2] / "workflow" / "scripts"
-# Snakemake puts such an object, and the folder of the script, before what the script says.
-BEFORE = f"""
+# Snakemake runs a script with such an object, from the folder of the script.
+BEGIN = f"""
 import sys, types
 sys.path.insert(0, {str(SCRIPTS)!r})
-snakemake = types.SimpleNamespace(log=sys.argv[1:], output=sys.argv[2:], params=types.SimpleNamespace(asked="scene 0"))
-snakemake.log = snakemake.log[:1]
-from job import logged
+from job import begin
+begin(f"{{sys.argv[1]}}/work.py", types.SimpleNamespace(
+    rule="work", wildcards={{}}, input={{}}, output=[], log=[sys.argv[2]],
+    params=types.SimpleNamespace(asked="scene 0"),
+))
 """
-IN_BLOCK = "with logged() as say:\n    "
+
+
+WARM = SCRIPTS.parent / "warm.py"
+IN_BLOCK = "def make(job, say):\n    "
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """Where a warm process listens; it ends after the tests of this file."""
+    place = str(tmp_path_factory.mktemp("warm") / "socket")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(place)
+        listener.listen()
+        handle = listener.fileno()
+        process = subprocess.Popen([sys.executable, str(WARM), str(handle)], pass_fds=[handle])
+    yield place
+    process.kill()
+    process.wait()
+
+
+@pytest.fixture(autouse=True, params=["alone", "handed over"])
+def how(request, monkeypatch):
+    """Whether a script does its job itself."""
+    if request.param == "alone":
+        monkeypatch.delenv("STIFFDICE_WARM", raising=False)
+    else:
+        monkeypatch.setenv("STIFFDICE_WARM", request.getfixturevalue("address"))
+    return request.param
 
 
 def script(*lines: str, log) -> list[str]:
-    return [sys.executable, "-c", BEFORE + "\n".join(lines), str(log)]
+    """Return the command of a job that does what the lines say: some in `make`, some before it."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "work.py").write_text("\n".join(lines))
+    return [sys.executable, "-c", BEGIN, str(folder), str(log)]
 
 
 def run(*lines: str, log) -> subprocess.CompletedProcess[str]:
@@ -37,10 +74,11 @@ def test_a_job_that_does_what_it_should(tmp_path):
     log = tmp_path / "log"
     ended = run(IN_BLOCK + "say('simulation: 1.000 s')", log=log)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
-    first, asked, said, last = log.read_text().splitlines()
+    first, asked, said, memory, last = log.read_text().splitlines()
     assert first.startswith("begun 20")
     assert asked == "asked: scene 0"
     assert said == "simulation: 1.000 s"
+    assert 10 < int(memory.removeprefix("memory: ").removesuffix(" MB")) < 10_000
     assert last.startswith("done in ")
     assert job_log.read(log).ending == "done"
 
@@ -102,14 +140,14 @@ def test_a_signal_is_the_last_word_if_it_leaves_time_for_one(tmp_path, number, s
 
 
 def test_no_room_for_the_log_does_not_stop_a_job(tmp_path):
-    ended = run(IN_BLOCK + "say('simulation: 1.000 s')", "print('made')", log="/dev/full")
+    ended = run(IN_BLOCK + "say('simulation: 1.000 s'); print('made', flush=True)", log="/dev/full")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "made\n", "")
     ended = run(IN_BLOCK + OURS, log="/dev/full")
     assert (ended.returncode, ended.stderr) == (2, "stiffdice: /dev/full: failed: x.h5: no room\n")
 
 
 def test_a_log_that_cannot_be_opened_is_one_line(tmp_path):
-    ended = run("print('made')", log=tmp_path)
+    ended = run(IN_BLOCK + "print('made')", log=tmp_path)
     assert ended.returncode == 1
     assert (ended.stdout, ended.stderr) == ("", f"stiffdice: {tmp_path}: Is a directory\n")
 
@@ -122,7 +160,7 @@ def test_progress_is_told_by_tenths(tmp_path):
         "    for k in range(1000): tell((k + 1) / 1000)",
         log=log,
     )
-    assert log.read_text().splitlines()[2:-1] == [f"{k}0% of the steps done" for k in range(1, 11)]
+    assert log.read_text().splitlines()[2:-2] == [f"{k}0% of the steps done" for k in range(1, 11)]
     assert job_log.read(log).progress == 1
 
 

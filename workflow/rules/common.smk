@@ -20,7 +20,9 @@ SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 BEGUN = time.time()
 
 # What this process needs besides the rules.
-sys.path.append(str(Path(workflow.basedir) / "workflow"))
+sys.path += [str(Path(workflow.basedir) / "workflow"), str(Path(workflow.basedir) / "workflow" / "scripts")]
+
+from job import Sealed
 
 
 wildcard_constraints:
@@ -116,6 +118,11 @@ def planned_figure(wildcards):
 
 def planned_table(wildcards):
     return study(wildcards.study).tables[wildcards.table]
+
+
+def sealed(planned):
+    """Return a parameter that Snakemake does not compare, as it does `asked`: what the study's file says of a job."""
+    return lambda wildcards: Sealed(planned(wildcards))
 
 
 @cache

@@ -14,7 +14,7 @@ rule figure:
         ),
         "results/{study}/figures/{figure}.png",
     params:
-        figure=lambda wildcards: planned_figure(wildcards),
+        planned=sealed(planned_figure),
         dpi=lambda wildcards: study(wildcards.study).dpi,
         asked=asked_of("figure", "{figure}"),
     log:
@@ -39,7 +39,7 @@ use rule figure as animation with:
             labels={"what": "{figure}"},
         ),
     params:
-        figure=lambda wildcards: planned_figure(wildcards),
+        planned=sealed(planned_figure),
         dpi=80,  # for screens, whatever the study asks of its PNG files
         asked=asked_of("animation", "{figure}"),
     log:
@@ -61,7 +61,7 @@ rule table:
         ),
         csv="results/{study}/tables/{table}.csv",
     params:
-        table=lambda wildcards: planned_table(wildcards),
+        planned=sealed(planned_table),
         asked=asked_of("table", "{table}"),
     log:
         "results/{study}/logs/table/{table}.log",

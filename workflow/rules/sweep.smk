@@ -10,7 +10,7 @@ rule shard:
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        planned=sealed(planned_sweep),
         asked=asked_of("shard", "{sweep}/{shard}"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
@@ -35,7 +35,7 @@ rule survey:
     output:
         sweep="results/{study}/sweeps/{sweep}/surveys/{round}.h5",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        planned=sealed(planned_sweep),
         asked=asked_of("survey", "{sweep}/{round}"),
     log:
         "results/{study}/logs/survey/{sweep}/{round}.log",
@@ -60,7 +60,7 @@ rule collect:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
-        sweep=lambda wildcards: planned_sweep(wildcards),  # no plain data, so not compared; `asked` is
+        planned=sealed(planned_sweep),
         asked=asked_of("collect", "{sweep}"),
     log:
         "results/{study}/logs/collect/{sweep}.log",

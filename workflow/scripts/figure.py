@@ -1,16 +1,18 @@
 """Draw one figure."""
 
-from typing import Any
+from job import Job, Say, begin
 
-from inputs import opened
-from job import logged
 
-from stiffdice.report.figures import registry as figures
+def make(job: Job, say: Say) -> None:
+    """Draw the figure from its files."""
+    from inputs import opened
 
-snakemake: Any  # Snakemake puts it here
+    from stiffdice.report.figures import registry as figures
 
-planned = snakemake.params.figure
-with logged() as say:
-    data = opened(snakemake.input.items(), say)
-    figures.draw(planned.draw, data, planned.title, snakemake.params.dpi, list(snakemake.output))
+    planned, data = job.plan(), opened(job.input.items(), say)
+    figures.draw(planned.draw, data, planned.title, job.dpi, job.output)
     say(f"{planned.draw} drawn")
+
+
+if __name__ == "__main__":
+    begin(__file__, globals()["snakemake"])

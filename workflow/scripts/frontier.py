@@ -1,17 +1,21 @@
 """Find the edges of stability in a collected sweep."""
 
-from typing import Any
+from job import Job, Say, begin
 
-from inputs import opened
-from job import logged
 
-from stiffdice.io.writer import write_bytes, write_dataset
-from stiffdice.sweep import stability_limits
+def make(job: Job, say: Say) -> None:
+    """Store the edges as data and as a table."""
+    from inputs import opened
 
-snakemake: Any  # Snakemake puts it here
+    from stiffdice.io.writer import write_bytes, write_dataset
+    from stiffdice.sweep import stability_limits
 
-with logged() as say:
-    found = stability_limits.find(opened(snakemake.input.items(), say)["sweep"])
-    write_dataset(found, snakemake.output.data)
-    write_bytes(stability_limits.table(found).encode(), snakemake.output.table)
+    found = stability_limits.find(opened(job.input.items(), say)["sweep"])
+    data, table = job.output
+    write_dataset(found, data)
+    write_bytes(stability_limits.table(found).encode(), table)
     say(f"{found.sizes['stiffness']} stiffnesses, {found.sizes['criterion']} criteria")
+
+
+if __name__ == "__main__":
+    begin(__file__, globals()["snakemake"])

@@ -1,24 +1,24 @@
 """Compute one shard and store its runs."""
 
 from pathlib import Path
-from typing import Any
 
-from inputs import opened
-from job import Stopwatch, logged, tenths
+from job import Job, Say, Stopwatch, begin, tenths
 
-from stiffdice.study import job_log
-from stiffdice.sweep import partition
-from stiffdice.sweep.reuse import Kept
-from stiffdice.sweep.shard import compute_shard
 
-snakemake: Any  # Snakemake puts it here
+def make(job: Job, say: Say) -> None:
+    """Simulate the cells of the shard that its file's name is the digest of."""
+    from inputs import opened
 
-with logged() as say:
-    planned, target = snakemake.params.sweep, Path(snakemake.output[0])
+    from stiffdice.study import job_log
+    from stiffdice.sweep import partition
+    from stiffdice.sweep.reuse import Kept
+    from stiffdice.sweep.shard import compute_shard
+
+    planned, target = job.plan(), Path(job.output[0])
     plan = partition.of(planned)
     number, part, parts, _, pieces = plan[target.stem]
     if number:
-        survey = opened([("survey", snakemake.input[0])], say)["survey"]
+        survey = opened([("survey", job.input["survey"][0])], say)["survey"]
         pieces = partition.later(planned, survey, number, parts)[part]
     kept = Kept(planned, pieces, target.parent, plan, say)
     watch = Stopwatch()
@@ -28,3 +28,7 @@ with logged() as say:
     if kept:
         say(f"of these, {len(kept)} cells kept from shards of an earlier plan")
     say(f"simulation: {watch.seconds:.3f} s")
+
+
+if __name__ == "__main__":
+    begin(__file__, globals()["snakemake"])

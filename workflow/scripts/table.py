@@ -1,19 +1,22 @@
 """Tell what sweeps or experiments found as a table, for people and for programs."""
 
-from typing import Any
+from job import Job, Say, begin
 
-from inputs import opened
-from job import logged
 
-from stiffdice.io.writer import write_bytes
-from stiffdice.study.catalogue import TABLES
+def make(job: Job, say: Say) -> None:
+    """Write the table from its files, as Markdown and as CSV."""
+    from inputs import opened
 
-snakemake: Any  # Snakemake puts it here
+    from stiffdice.io.writer import write_bytes
+    from stiffdice.study.catalogue import TABLES
 
-planned = snakemake.params.table
-with logged() as say:
-    data = opened(snakemake.input.items(), say)
-    table = TABLES[planned.draw].load()(data, planned.title)
-    write_bytes(table.markdown.encode(), snakemake.output.markdown)
-    write_bytes(table.csv.encode(), snakemake.output.csv)
+    planned = job.plan()
+    table = TABLES[planned.draw].load()(opened(job.input.items(), say), planned.title)
+    markdown, csv = job.output
+    write_bytes(table.markdown.encode(), markdown)
+    write_bytes(table.csv.encode(), csv)
     say(f"{planned.draw} told")
+
+
+if __name__ == "__main__":
+    begin(__file__, globals()["snakemake"])

@@ -1,20 +1,18 @@
-"""Run one scene and store its trajectory, with the ledger of its energy."""
+"""Run one scene and store its trajectory, with its energy budget."""
 
-from typing import Any
+from job import Job, Say, Stopwatch, begin
 
-from job import Stopwatch, logged
 
-from stiffdice.io.writer import write_dataset
-from stiffdice.scene import scene as scenes
-from stiffdice.simulation import energy_budget
-from stiffdice.simulation.backend import OURS
-from stiffdice.simulation.dataset import run_dataset
-from stiffdice.simulation.run import simulate
+def make(job: Job, say: Say) -> None:
+    """Run the scene in one preset."""
+    from stiffdice.io.writer import write_dataset
+    from stiffdice.scene import scene as scenes
+    from stiffdice.simulation import energy_budget
+    from stiffdice.simulation.backend import OURS
+    from stiffdice.simulation.dataset import run_dataset
+    from stiffdice.simulation.run import simulate
 
-snakemake: Any  # Snakemake puts it here
-
-planned, preset = snakemake.params.run, snakemake.wildcards.preset
-with logged() as say:
+    planned, preset = job.plan(), job.wildcards["preset"]
     scene = scenes.load(planned.scene, preset=preset)
     watch = Stopwatch()
     with watch.running():
@@ -26,9 +24,13 @@ with logged() as say:
             steps=planned.steps,
             every=planned.every,
         )
-        dataset = run_dataset(run, f"{snakemake.wildcards.run}, {preset.replace('_', ' ')}")
+        dataset = run_dataset(run, f"{job.wildcards['run']}, {preset.replace('_', ' ')}")
         if planned.simulator == OURS and planned.scheme in energy_budget.BOOKED:
             ledger = energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
             dataset = dataset.assign(ledger.data_vars)
-    write_dataset(dataset, snakemake.output[0])
+    write_dataset(dataset, job.output[0])
     say(f"simulation: {watch.seconds:.3f} s")
+
+
+if __name__ == "__main__":
+    begin(__file__, globals()["snakemake"])

@@ -77,6 +77,11 @@ def cells(count: int, members: int) -> str:
     return f"{count} cells, {count * members} runs"
 
 
+def memory(peak: int) -> str:
+    """Return the line that tells the most memory [B] that the job held at a time."""
+    return f"memory: {peak / 1e6:.0f} MB"
+
+
 def done(seconds: float) -> str:
     """Return the last line of a job that made what it should."""
     return f"done in {seconds:.1f} s"

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FuncAnimation
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from stiffdice.dynamics.state import Array
 from stiffdice.report.figures import style
-from stiffdice.report.figures.registry import FRAMES_PER_SECOND
+from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
 from stiffdice.report.number_format import describe, scene_of
 from stiffdice.scene.cube import LINKS
 
@@ -31,7 +30,7 @@ def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
 start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
 
 
-def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
+def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
     """Return the whole run in real time."""
     run = next(iter(runs.values()))
     figure, show = _stage(run, title)
@@ -43,7 +42,7 @@ def animation(runs: Mapping[str, xr.Dataset], title: str) -> FuncAnimation:
         clock.set_text(f"t = {float(run.time[indices[number]]):4.1f} s")
         return [*show(int(indices[number])), clock]
 
-    return FuncAnimation(figure, frame, frames=count)
+    return Animation(figure, frame, count)
 
 
 def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[Any]]]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numpy as np
 import xarray as xr
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from PIL import Image
 
 from stiffdice.io.writer import write_bytes
 from stiffdice.report.figures import style
@@ -16,6 +20,15 @@ from stiffdice.study.catalogue import DRAWINGS
 
 # Of an animation; 50 ms a frame, because a GIF counts in hundredths of a second.
 FRAMES_PER_SECOND = 20
+COLOURS = 64  # of all frames together
+
+
+class Animation(NamedTuple):
+    """A figure, what moves in it at a frame, from 0 on, and the number of frames."""
+
+    figure: Figure
+    show: Callable[[int], list[Any]]
+    frames: int
 
 
 def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, paths: list[str]) -> None:
@@ -29,8 +42,8 @@ def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, pat
             write_bytes(_encoded(figure, Path(path).suffix[1:], dpi), path)
 
 
-def _encoded(figure: Figure | FuncAnimation, kind: str, dpi: int) -> bytes:
-    if isinstance(figure, FuncAnimation):
+def _encoded(figure: Figure | Animation, kind: str, dpi: int) -> bytes:
+    if isinstance(figure, Animation):
         return _gif(figure, dpi)
     stream = io.BytesIO()
     metadata = {"svg": {"Date": None, "Creator": "stiffdice"}, "png": {"Software": "stiffdice"}}[kind]
@@ -38,10 +51,25 @@ def _encoded(figure: Figure | FuncAnimation, kind: str, dpi: int) -> bytes:
     return stream.getvalue()
 
 
-def _gif(animation: FuncAnimation, dpi: int) -> bytes:
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "animation.gif"
-        animation.save(path, writer=PillowWriter(fps=FRAMES_PER_SECOND), dpi=dpi)
-        return path.read_bytes()
+def _gif(animation: Animation, dpi: int) -> bytes:
+    """Return a GIF of frames for which what does not move is drawn once."""
+    figure = animation.figure
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    for artist in animation.show(0):
+        artist.set_animated(True)
+    canvas.draw()
+    still, frames = canvas.copy_from_bbox(figure.bbox), []
+    for number in range(animation.frames):
+        canvas.restore_region(still)
+        for artist in animation.show(number):
+            if isinstance(artist, Line3DCollection):
+                artist.do_3d_projection()  # which is else the axes' to call
+            figure.draw_artist(artist)
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    palette = frames[-1].quantize(COLOURS, Image.Quantize.FASTOCTREE)
+    images = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    stream = io.BytesIO()
+    every = 1000 // FRAMES_PER_SECOND
+    images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=every, loop=0)
+    return stream.getvalue()

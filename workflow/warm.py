@@ -1,0 +1,112 @@
+"""A process that has imported what jobs need, and forks one child for each job: warm.py HANDLE, of a listening socket
+
+A job then begins in milliseconds; a process of its own would import for a second or two. `run.py` starts it beside
+Snakemake, and `scripts/job.py` hands jobs over. Linux only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import importlib
+import os
+import pickle
+import selectors
+import signal
+import socket
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "workflow" / "scripts"), str(ROOT / "src")]
+
+import job  # noqa: E402
+
+from stiffdice.study.process import end_with_parent  # noqa: E402
+
+_MODULES = (
+    *("stiffdice.simulation.dataset", "stiffdice.simulation.energy_budget", "stiffdice.sweep.shard"),
+    *("stiffdice.sweep.collect", "stiffdice.sweep.stability_limits", "stiffdice.report.figures.style"),
+    *("stiffdice.report.figures.registry", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg"),
+    *("h5netcdf", "PIL.Image"),
+)
+
+
+class Warm:
+    """Takes jobs from a listening socket, and does each in a child."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self._events = selectors.DefaultSelector()
+        self._events.register(self._listener, selectors.EVENT_READ, self._take)
+
+    def serve(self) -> NoReturn:
+        """Do jobs until this process is ended."""
+        while True:
+            for event, _ in self._events.select():
+                event.data()
+
+    def _take(self) -> None:
+        client, _ = self._listener.accept()
+        try:
+            head, handles, _, _ = socket.recv_fds(client, 8, 2)
+            content = b""
+            while len(content) < int.from_bytes(head):
+                content += client.recv(1 << 20)
+        except (OSError, ValueError):
+            client.close()
+            return
+        process = os.fork()
+        if not process:
+            self._become(job.Job(*pickle.loads(content)), handles)
+        for handle in handles:
+            os.close(handle)
+        ended = os.pidfd_open(process)
+        self._events.register(ended, selectors.EVENT_READ, lambda: self._end(process, ended, client))
+        self._events.register(client, selectors.EVENT_READ, lambda: self._forward(process, client))
+
+    def _become(self, what: job.Job, handles: list[int]) -> NoReturn:
+        """Do one job in this process, a child of the warm one."""
+        end_with_parent("warm.py")
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self._listener.close()
+        for number, handle in enumerate(handles, start=1):
+            os.dup2(handle, number)
+        job.carry_out(what)
+
+    def _forward(self, process: int, client: socket.socket) -> None:
+        """Pass a signal on to a job; end the job if its script is gone."""
+        try:
+            number = client.recv(1)
+        except OSError:
+            number = b""
+        if not number:
+            self._events.unregister(client)
+        os.kill(process, number[0] if number else signal.SIGKILL)
+
+    def _end(self, process: int, ended: int, client: socket.socket) -> None:
+        _, status = os.waitpid(process, 0)
+        code = os.waitstatus_to_exitcode(status)
+        with contextlib.suppress(OSError):
+            client.send(bytes([code if code >= 0 else 128 - code]))
+        self._events.unregister(ended)
+        with contextlib.suppress(KeyError):
+            self._events.unregister(client)
+        client.close()
+        os.close(ended)
+
+
+def main() -> NoReturn:
+    """Listen, import, and do jobs until the process that started this one ends."""
+    end_with_parent("run.py")
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warm = Warm(socket.socket(fileno=int(sys.argv[1])))
+    for name in _MODULES:
+        importlib.import_module(name)
+    gc.freeze()
+    warm.serve()
+
+
+if __name__ == "__main__":
+    main()
