@@ -52,5 +52,6 @@ def test_only_what_is_there_is_named(ending, project):
 
 
 def test_a_table_where_no_figure_is(ending, project):
-    made(project, "stability/tables/paper-questions.md")
-    assert ending.open_first(project, "stability").startswith("open first: results/stability/tables/paper-questions.md (")
+    table = "stability/tables/paper-questions.md"
+    made(project, table)
+    assert ending.open_first(project, "stability").startswith(f"open first: results/{table} (")
