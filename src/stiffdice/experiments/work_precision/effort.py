@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.experiments.layout import EFFORT_GRID, EFFORTS, Variable, quantity
-from stiffdice.experiments.sampling import states_of
+from stiffdice.experiments.measuring import Variable, quantity, states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
@@ -42,7 +41,12 @@ COARSE, FINE = 1e-2, 1e-12
 # ωh of a flat landing where the ladder of a fixed step begins: where the explicit schemes are stable.
 LONGEST = 1.5
 
-
+# What every run on a ladder has: dimensions; meaning and unit.
+GRID = ("stiffness", "method", "effort")
+EFFORTS = {
+    "steps": ("number of time steps, 0 where the method takes its own", "1"),
+    "tolerance": ("tolerance of a method that controls its own error", "1"),
+}
 # Zero past a ladder's end, where other numbers are not-a-number.
 _COUNTS = {"steps", "evaluations", "evaluations_computed"}
 
@@ -143,5 +147,5 @@ def by_effort(
         values = np.zeros(shape, np.int64) if name in _COUNTS else np.full(shape, np.nan)
         for i, k in np.ndindex(shape[:2]):
             values[i, k, : len(found[i][k])] = [rung[name] for rung in found[i][k]]
-        variables[name] = quantity(EFFORT_GRID, values, *text)
+        variables[name] = quantity(GRID, values, *text)
     return variables

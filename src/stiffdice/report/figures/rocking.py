@@ -54,7 +54,8 @@ def _limits(panel: Any, dataset: xr.Dataset) -> None:
     for i, inertia in enumerate(meanings_of(dataset.inertia)):
         for k, mode in enumerate(meanings_of(dataset.mode)):
             _marks(panel, zeta, dataset.limit.values[i, k], mode, inertia)
-    error = readable(np.abs(dataset.limit_error.values).max(), digits=2)
+    theory = np.array([linear_theory.stability_limit(value) for value in zeta])
+    error = readable(np.abs(dataset.limit.values / theory - 1).max(), digits=2)
     style.write_in_corner(panel, 0.98, f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}")
     panel.set_title("One limit in units of each mode's own ω")
     panel.set_xlabel("damping ratio ζ of the mode [1]")
@@ -67,7 +68,7 @@ def _longest_steps(panel: Any, dataset: xr.Dataset) -> None:
     modes, inertias = meanings_of(dataset.mode), meanings_of(dataset.inertia)
     steps = dataset.longest_step.values[:, :, least]
     numbers = dataset.mode_number_theory.values
-    predicted = float(dataset.limit_theory[least]) / np.sqrt(numbers)
+    predicted = linear_theory.stability_limit(float(dataset.zeta[least])) / np.sqrt(numbers)
     for i, inertia in enumerate(inertias):
         worst = int(steps[i].argmin())
         panel.axhline(steps[i, worst], color=_LOOKS[modes[worst]]["color"], linewidth=0.8, linestyle=":", zorder=1)
