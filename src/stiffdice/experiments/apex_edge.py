@@ -50,10 +50,8 @@ def measure(
     """Return the edge of `apex` in ωh, dimensions contact, duration and hop_height, and the predicted one.
 
     hop_height [m]: lower rebounds are not judged. duration [s]: of the runs. omega_h: ends of the scan; count: values
-    in it, evenly in their logarithm. members: launches at each. `last_fail` is the smallest ωh, so the most steps, at
-    which a member fails; not-a-number where none does.
-
-    Raises InputError for a number out of range.
+    in it, evenly in their logarithm. members: launches at each. `last_fail` is the smallest ωh at which a member fails;
+    not-a-number where none does. Raises InputError for a number out of range.
     """
     heights = numbers("hop_height", hop_height, "m", at_least=0)
     durations = numbers("duration", duration, "s", above=0)

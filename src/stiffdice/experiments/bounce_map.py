@@ -48,11 +48,9 @@ def measure(
     """Return what single bounces gain and lose, dimensions omega_h and phase.
 
     scene: gives the cube, the stiffness, gravity, and the speed with which its launch, in free fall, would meet level
-    ground; the experiment sets all else. omega_h: ends of the span, between 0 and 2. count: values in it, evenly in
-    their logarithm, to which all magic steps of the span and those half way between them are added. phases: how many,
-    evenly over a step from 0 on; the phase is how much of the step has passed when the node meets the ground.
+    ground. omega_h: ends of the scan, between 0 and 2. count: values in it, evenly in their logarithm, besides all
+    magic steps and those half way between them. phases: how many, evenly over a step from 0 on.
     `energy_gain` is e²−1, without gravity; `largest_with_gravity` that of the largest size with the scene's.
-
     Raises InputError for a number out of range, and for a scene whose cube would not bounce flat and short.
     """
     low, high = span(omega_h, _LOWEST, linear_theory.STABILITY_LIMIT)

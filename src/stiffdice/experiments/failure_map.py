@@ -46,8 +46,8 @@ def _with_radius(scene: Scene, radius: float) -> Scene:
 
 
 def _with_spin(scene: Scene, rate: float) -> Scene:
-    x, y, z = (float(part) for part in _SPIN_ABOUT * rate * scene.cube.moment_of_inertia)
-    return relaunched(scene, angular_momentum=(x, y, z))
+    momentum = _SPIN_ABOUT * rate * scene.cube.moment_of_inertia
+    return relaunched(scene, angular_momentum=tuple(momentum.tolist()))
 
 
 def _with_ground(key: str) -> Callable[[Scene, float], Scene]:
@@ -98,7 +98,6 @@ def measure(
     axis: a name of AXES. values: of that axis, in its units; its own if none are given, and always for `start`.
     budget: most steps to compute one by one for a run; one that needs more is undecided.
     Dimensions contact, value, steps; theory's limits have limit, contact, value.
-
     Raises InputError for an unknown name, a number out of range, and a spin of a cube that does not turn.
     """
     chosen = AXES[validation.choice("axis", axis, AXES)]

@@ -44,13 +44,11 @@ def measure(
     step_size: Sequence[float] = tuple(np.logspace(-8, -2.5, 23)),
     steps: int = 4000,
 ) -> xr.Dataset:
-    """Return the swing of the sliding speed of a cube at rest [m/s], measured and by theory.
+    """Return the swing of the sliding speed of a cube at rest [m/s], measured and by theory, and `least_step` [s].
 
-    scene: gives the cube, gravity, stiffness and damping; the experiment puts the cube at rest on level ground under
-    the gated law, sliding at first with three steps' friction. friction: coefficients. step_size [s]: up to ωh = 1.5.
-    steps: how many are taken, and more where the swing needs them to settle; it is that of the last 200.
-    Dimensions friction, step_size; `least_step` has friction: the step size from which on theory says it chatters.
-
+    scene: gives the cube, gravity, stiffness and damping; the cube rests on level ground under the gated law, sliding
+    at first with three steps' friction. friction: coefficients. step_size [s]: up to ωh = 1.5. steps: how many are
+    taken, and more where the swing needs them to settle; it is that of the last 200. Dimensions friction, step_size.
     Raises InputError for a number out of range, and for a scene in which the cube does not rest on four nodes.
     """
     coefficients = numbers("friction", friction, "1", above=0)

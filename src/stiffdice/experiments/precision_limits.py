@@ -38,13 +38,11 @@ Found = tuple[float, float]  # predicted, measured
 def measure(
     scene: Scene, *, stiffness: float = 1.0e6, omega_h: float = 0.3, coarse: int = 10, members: int = 64
 ) -> xr.Dataset:
-    """Return limits of a scene, predicted and measured; dimension limit.
+    """Return limits of a scene on level ground, gated, without damping and friction, predicted and measured.
 
     stiffness [kg/s²], omega_h [1]: of the bounces through which round-off is followed. coarse: in so many steps of the
     scene's duration the run begins whose first contact is to leave the range. members: pairs of runs, spread over the
-    phase of the touch-down, whose growth is averaged in its logarithm.
-    The experiment puts the cube on level ground, gated, without damping and friction.
-
+    phase of the touch-down, whose growth is averaged in its logarithm. Dimension limit.
     Raises InputError for a number out of range and for a scene without gravity, or not launched up from above the
     ground.
     """

@@ -82,14 +82,11 @@ def measure(
 ) -> xr.Dataset:
     """Return the measured limits of all modes, and the growth of a nudge around two of them.
 
-    scene: gives the cube's size and mass, the stiffness and gravity; the experiment sets inertia, damping and launch,
-    and puts the cube on level ground without friction under the gated law. zeta: damping ratios ζ = (D/S) ω/2 of each
-    mode itself, up to 1, for the linearised step. nudge_zeta, omega_h_relative, steps: damping ratios, ωh in units of
-    its limit, and steps at most for the nudged cube.
-    Dimensions inertia, mode, zeta; and inertia, nudge, nudge_zeta, omega_h_relative.
-    Relative accuracy: limits 2.5e-7; growth, but for the limit itself, 1e-6 for a sag of 2e-6 to 2e-4 of the side, 6e-4
-    on the softest ground that is allowed, 2e-5 on the hardest.
-
+    scene: gives the cube's size and mass, the stiffness and gravity. zeta: damping ratios ζ = (D/S) ω/2 of each mode
+    itself, up to 1, for the linearised step. nudge_zeta, omega_h_relative, steps: damping ratios, ωh in units of its
+    limit, and steps at most for the nudged cube.
+    Dimensions inertia, mode, zeta; and inertia, nudge, nudge_zeta, omega_h_relative. Relative accuracy: limits 2.5e-7;
+    growth, but for the limit itself, 1e-6 for a sag of 2e-6 to 2e-4 of the side, else at most 6e-4.
     Raises InputError for a number out of range and for a scene in which the cube sinks too far or too little to nudge.
     """
     zeta = _numbers("zeta", zeta, 0.0, 1.0)

@@ -50,11 +50,9 @@ def measure(
 
     scene: gives the cube, gravity, stiffness, damping, and the speed at which its launch meets the ground, which is
     level, gated and without friction. methods: names of schemes and engines. omega_h: ends of the span. count: values
-    in it, evenly in their logarithm, to which the longest magic steps are added and those half way between them, at
-    which symplectic Euler is at its best and worst. phases: how many, evenly over a step from 0 on.
-    `restitution` is not-a-number unless the cube leaves the ground. `rest_growth` is the largest distance from where
-    the cube would rest, over the nudge; infinite where it blows up.
-
+    in it, evenly in their logarithm, besides the longest magic steps and those half way between them. phases: how many,
+    evenly over a step from 0 on. `restitution` is not-a-number unless the cube leaves the ground; `rest_growth` the
+    largest distance from where it would rest over the nudge, infinite where it blows up.
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short.
     """

@@ -36,7 +36,6 @@ def time(
 
     scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
-
     Raises InputError for a number out of range, and an engine that is not installed.
     """
     names = stepper.chosen_from(methods)

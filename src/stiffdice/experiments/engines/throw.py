@@ -50,10 +50,9 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     """Return where the cube is, dimensions method, effort, time, axis, and its distance from the reference.
 
     methods: names of schemes and engines; one that cannot represent the scene is left out, and `unfit` says why.
-    steps: of the simplest scheme at the most; of another so many less as its steps take longer (`Peer.dearness`),
-    so that each is given about the same time. samples: equal parts of the duration; a state is stored after each.
+    steps: of the simplest scheme at the most; of another so many less as its steps take longer (`Peer.dearness`).
+    samples: equal parts of the duration, after which states are compared.
     `reference_error` is how far the reference is from the same at a thousand times its tolerance.
-
     Raises InputError for a number out of range, an engine that is not installed, and a scene that none can represent.
     """
     samples = validation.count("samples", samples)

@@ -56,9 +56,7 @@ def measure(
     scene: a cube that lands flat and slides along x; gives cube, launch and damping. stiffness [kg/s²], friction [1]:
     of its ground. horizon [s]: until when runs are compared. tolerance [1]: of the scheme `event`, which makes them.
     parted [m]: the distance at which a path counts as another one.
-    Dimensions approximation, contact, friction, stiffness. Not-a-number where there is no parting, or no second
-    landing, before the horizon.
-
+    Dimensions approximation, contact, friction, stiffness; NaN where there is no parting, or no second landing.
     Raises InputError for a number out of range, and for a scene in which the cube does not land flat and slide.
     """
     grounds = numbers("stiffness", stiffness, "kg/s²", above=0)

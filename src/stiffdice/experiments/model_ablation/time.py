@@ -76,9 +76,8 @@ def time(scene: Scene, *, steps: int = 20_000, rounds: int = 25) -> xr.Dataset:
     """Return how long full and least model take, and their ratios; seconds of this machine, another at every call.
 
     scene: changed as `pieces_of` says. steps: of each run. rounds: of all runs in turn, of which the medians are taken,
-    so that a busy moment falls on all alike; ratios are medians of the rounds' own.
-    Variables as _KINDS says, dimensions piece and role; the tensor is timed in bare steps only.
-    Raises InputError for a number out of range.
+    so that a busy moment falls on all alike; ratios are medians of the rounds' own. Variables as _KINDS says,
+    dimensions piece and role; the tensor is timed in bare steps only. Raises InputError for a number out of range.
     """
     steps, rounds = validation.count("steps", steps), validation.count("rounds", rounds)
     pieces = pieces_of(scene)

@@ -16,7 +16,6 @@ from stiffdice.dynamics import linear_theory
 from stiffdice.experiments.measuring import Variable, quantity, states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
-from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import fixed_step as stepping
 from stiffdice.simulation.engines import registry as engines
@@ -69,12 +68,7 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
     Raises InputError for any other name, and for an engine that is not installed.
     """
     known = methods_for(problem)
-    if list(names) == [ALL]:
-        return known
-    for name in names:
-        if validation.choice("methods", name, [*known, *STEPPING, ALL]) in PEERS:
-            engines.adapter_of(name, "methods")
-    return list(names)
+    return known if list(names) == [ALL] else stepper.chosen_from(names, [*known, *STEPPING])
 
 
 def fixed_step(method: str) -> bool:

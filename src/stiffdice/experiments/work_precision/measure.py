@@ -72,13 +72,10 @@ def measure(
     """Return errors and force evaluations, dimensions stiffness, method, effort (NaN and 0 past a ladder's end).
 
     problem: a name of PROBLEMS. methods: names of schemes and peers. stiffness [kg/s²]. per_decade: efforts in a decade
-    of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made;
-    where flights, or contacts that are known, are taken at once, a run may have many more. A peer's ladder ends at its
-    part of it (`Peer.dearness`).
-    `evaluations` are those of plain stepping, `evaluations_computed` those made. `agreement` has the difference of each
-    reference from the first, `floor` what half a unit in the last place grows to: in the launch, and in the place
-    during a contact, where it is one of the depth.
-
+    of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made,
+    those taken at once not counted; a peer's ladder ends at its part of it (`Peer.dearness`).
+    `agreement` has the difference of each reference from the first, `floor` what half a unit in the last place grows
+    to: in the launch, and in the place during a contact, where it is one of the depth.
     Raises InputError for a number out of range, and for a scene in which the cube does not land and leave again.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]

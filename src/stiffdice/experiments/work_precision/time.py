@@ -52,9 +52,7 @@ def time(
 
     problem, methods, stiffness, per_decade: as for the experiment `work-precision`. affordable [s]: longer runs are
     timed once. The ladder of a fixed step ends there, as above it `seconds_per_step` says, any other after three times
-    that. rounds: in each every run is timed; the median is stored. Runs are warm.
-
-    Raises InputError as the experiment does.
+    that. rounds: in each every run is timed, warm. Raises InputError as the experiment does.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
     grounds = numbers("stiffness", stiffness, "kg/s²", above=0)
@@ -65,15 +63,11 @@ def time(
     for value in grounds:
         ground = scene_of(chosen, scene, value)
         climbed = [_climbed(chosen, ground, name, per_decade, affordable) for name in names]
-        times = iter(interleaved([run for rungs in climbed for _, run in rungs], rounds, affordable).median.tolist())
-        found.append([[effort._asdict() | {"seconds": next(times)} for effort, _ in rungs] for rungs in climbed])
-        ends = [rungs[-1] for rungs in found[-1]]
-        per_step.append(
-            [
-                end["seconds"] / end["steps"] if fixed_step(name) else math.nan
-                for name, end in zip(names, ends, strict=True)
-            ]
-        )
+        times, _ = interleaved([run for rungs in climbed for _, run in rungs], rounds, affordable)
+        taken = iter(times.tolist())
+        found.append([[effort._asdict() | {"seconds": next(taken)} for effort, _ in rungs] for rungs in climbed])
+        ends = zip(names, (rungs[-1] for rungs in found[-1]), strict=True)
+        per_step.append([end["seconds"] / end["steps"] if fixed_step(name) else math.nan for name, end in ends])
     variables = coordinates(stiffness=grounds, method=names)
     variables |= by_effort(found, {"seconds": ("median wall time of a run", "s")})
     variables["seconds_per_step"] = quantity(GRID[:2], per_step, _PER_STEP, "s")
