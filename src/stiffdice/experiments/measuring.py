@@ -127,10 +127,15 @@ def quantity(dimensions: str | Sequence[str], values: Any, meaning: str, unit: s
 
 
 def coordinates(**axes: Iterable[Any]) -> dict[str, Variable]:
-    """Return coordinates by name; words become an enum, whose value k means the k-th of them."""
+    """Return coordinates by name; words become an enum, whose value k means the k-th of them.
+
+    Raises InputError for one without values.
+    """
     found: dict[str, Variable] = {}
     for name, values in axes.items():
         listed = list(values)
+        if not listed:
+            raise InputError(f"{name} = []: allowed is at least one value")
         words = isinstance(listed[0], str)
         data = np.arange(len(listed), dtype=np.int8) if words else np.array(listed)
         if name in _KNOWN:
@@ -149,15 +154,11 @@ def mapped(
 
     function: of one value of each axis; returns the values of all variables, numbers or arrays. described: by variable,
     its meaning, unit and, if it is an array, the dimensions that follow those of the axes.
-
     Raises InputError for an axis without values.
     """
     lists = {name: list(values) for name, values in axes.items()}
-    for name, values in lists.items():
-        if not values:
-            raise InputError(f"{name} = []: allowed is at least one value")
-    columns = zip(*(function(*place) for place in itertools.product(*lists.values())), strict=True)
     variables = coordinates(**lists)
+    columns = zip(*(function(*place) for place in itertools.product(*lists.values())), strict=True)
     for (name, (meaning, unit, *inner)), column in zip(described.items(), columns, strict=True):
         data = np.array(column)
         shape = *map(len, lists.values()), *data.shape[1:]

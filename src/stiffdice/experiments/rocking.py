@@ -22,7 +22,7 @@ from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import bisected, mapped, numbers
+from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers
 from stiffdice.experiments.placement import level
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
@@ -61,13 +61,11 @@ _SAGS = 1e-7, 1e-1
 # ωh in units of its limit. Slower, a run's steps show too little of a swing; faster, the nudge is out of hand at once.
 _SCAN = 0.5, 1.15
 
-_NUMBERS = {
+_LIMITS = {
     "mode_number": ("k of omega^2 = k S/m, as the step shows it", "1"),
     "mode_number_theory": ("k of omega^2 = k S/m by theory", "1"),
-}
-_LIMITS = {
-    "limit": ("omega h at which one step's spectral radius passes 1; omega of the mode by theory", "1"),
-    "longest_step": ("step size h at the measured limit, as h sqrt(S/m)", "1"),
+    "limit": ("omega h at which one step's spectral radius passes 1; omega of the mode by theory", "1", "zeta"),
+    "longest_step": ("step size h at the measured limit, as h sqrt(S/m)", "1", "zeta"),
 }
 _GROWTH = {"growth": ("factor by which a nudge to the cube at rest grows in a step", "1")}
 
@@ -97,18 +95,15 @@ def measure(
     modes = {(inertia, name): _mode(ground, name) for inertia, ground in grounds.items() for name in _TILTS}
     unit = scene.ground.stiffness / scene.cube.mass  # of ω² [rad²/s²]
 
-    def numbers_of(inertia: str, name: str) -> tuple[float, float]:
-        return modes[inertia, name].square / unit, modes[inertia, name].predicted / unit
-
-    def limits(inertia: str, name: str, value: float) -> tuple[float, float]:
-        h = _limit(modes[inertia, name], value)
-        return h * np.sqrt(modes[inertia, name].predicted), h * np.sqrt(unit)
+    def limits(inertia: str, name: str) -> tuple[float, float, Array, Array]:
+        mode = modes[inertia, name]
+        h = np.array([_limit(mode, value) for value in zeta])
+        return mode.square / unit, mode.predicted / unit, h * np.sqrt(mode.predicted), h * np.sqrt(unit)
 
     def growth(inertia: str, nudge: str, value: float, relative: float) -> list[float]:
         return [_growth(_nudged(grounds[inertia], modes[inertia, NUDGES[nudge]], value, relative, steps))]
 
-    found = mapped(numbers_of, _NUMBERS, inertia=INERTIAS, mode=_TILTS)
-    found |= mapped(limits, _LIMITS, inertia=INERTIAS, mode=_TILTS, zeta=zeta)
+    found = coordinates(zeta=zeta) | mapped(limits, _LIMITS, inertia=INERTIAS, mode=_TILTS)
     found |= mapped(growth, _GROWTH, inertia=INERTIAS, nudge=NUDGES, nudge_zeta=nudge_zeta, omega_h_relative=scan)
     attributes = dataset.provenance_attributes("Limits of the contact modes", scene, MODEL, SCHEME, __name__)
     note = "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"

@@ -38,23 +38,12 @@ _KINDS = {
 }
 
 
-class Piece(NamedTuple):
-    """A piece of the full model: a scene that does not need it, and the two models that differ by it.
-
-    full: tensor is `tumbling` with a rotating tensor.
-    """
-
-    scene: Scene
-    full: str
-    least: str
-
-
-def pieces_of(scene: Scene) -> dict[str, Piece]:
-    """Return each piece with the given scene changed so that it needs all but that piece, by name.
+def pieces_of(scene: Scene) -> dict[str, tuple[Scene, str, str]]:
+    """Return by name a scene that needs all but one piece of the full model, and the models with and without it.
 
     rotation: a flat landing without friction. friction: a flat cube dropped straight. contact: a flight that ends in
-    the air, under a law without damping (of which `ungated` would drag on it). tensor: a throw with spin. all: the full
-    model for a flat cube dropped straight.
+    the air, under a law without damping (of which `ungated` would drag on it). tensor: a throw with spin, by `tumbling`
+    with a tensor that turns. all: the full model for a flat cube dropped straight.
     """
     down = scene.launch.velocity[2]
     flat = upright(scene.with_ground(normal=(0.0, 0.0, 1.0)))
@@ -64,11 +53,11 @@ def pieces_of(scene: Scene) -> dict[str, Piece]:
     spin = scene.cube.moment_of_inertia
     spun = relaunched(flat, angular_momentum=(1.7 * spin, 2.8 * spin, 1.1 * spin))
     return {
-        "rotation": Piece(flat.with_ground(friction=0.0), "tumbling", "sliding"),
-        "friction": Piece(dropped, "sliding", "vertical"),
-        "contact": Piece(high, "tumbling", "flying"),
-        "tensor": Piece(spun, "tensor", "tumbling"),
-        "all": Piece(dropped, "tumbling", "vertical"),
+        "rotation": (flat.with_ground(friction=0.0), "tumbling", "sliding"),
+        "friction": (dropped, "sliding", "vertical"),
+        "contact": (high, "tumbling", "flying"),
+        "tensor": (spun, "tensor", "tumbling"),
+        "all": (dropped, "tumbling", "vertical"),
     }
 
 
@@ -81,7 +70,7 @@ def time(scene: Scene, *, steps: int = 20_000, rounds: int = 25) -> xr.Dataset:
     """
     steps, rounds = validation.count("steps", steps), validation.count("rounds", rounds)
     pieces = pieces_of(scene)
-    runs = [[_runs(piece.scene, model, steps) for model in (piece.full, piece.least)] for piece in pieces.values()]
+    runs = [[_runs(there, model, steps) for model in both] for there, *both in pieces.values()]
     seconds = np.full((rounds + 1, len(_KINDS), len(runs), len(ROLES)), np.nan)
     for round_ in seconds:  # the first compiles
         for p, r in np.ndindex(len(runs), len(ROLES)):
