@@ -50,7 +50,7 @@ def measure(
     omega_h = validation.number("omega_h", omega_h, "1", above=0)
     coarse, members = validation.count("coarse", coarse), validation.count("members", members)
     bare = level(scene, damping=0.0, friction=0.0)
-    (_, _, z), (_, _, up), gravity = bare.launch.position, bare.launch.velocity, bare.gravity
+    (_, _, z), (_, _, up), gravity, mass = bare.launch.position, bare.launch.velocity, bare.gravity, bare.cube.mass
     if not (gravity > 0 and up > 0 and height_above(bare) > 0 and omega_h < 1):
         raise InputError("allowed are launches up from above the ground, under gravity, and omega_h < 1")
     stiff, still = bare.with_ground(stiffness=stiffness), relaunched(bare, velocity=(0.0, 0.0, 0.0))
@@ -64,7 +64,10 @@ def measure(
         # The first step falls by g h².
         "first_fall": ("s", _unchanged(still, "position", math.sqrt(_half_unit(z) / gravity))),
         "growth": ("1", _growth(stiff, omega_h, members)),
-        "square_of_frequency": ("kg s-2", _square_of_frequency(bare)),
+        "square_of_frequency": (
+            "kg s-2",
+            _found(LARGEST / 4 * mass, lambda stiffness: 4 * stiffness / mass < math.inf),
+        ),
         "first_contact": ("kg s-2", _first_contact(bare, coarse)),
     }
     predicted, measured = zip(*(pair for _, pair in found.values()), strict=True)
@@ -87,16 +90,12 @@ def _half_unit(value: float) -> float:
     return float(value - np.nextafter(value, 0.0)) / 2
 
 
-def _edge(holds: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the number from low to high up to which `holds` is true, to nine digits."""
+def _found(predicted: float, holds: Callable[[float], bool], factor: float = 1e3) -> Found:
+    """Return a limit and the number up to which `holds` is true, to nine digits, within a factor of it."""
+    low, high = predicted / factor, min(predicted * factor, LARGEST)
     assert holds(low)
     assert not holds(high)
-    return bisected(holds, low, high, relative=1e-9, logarithmic=True)[0]
-
-
-def _found(predicted: float, holds: Callable[[float], bool], factor: float = 1e3) -> Found:
-    """Return a limit and the number up to which `holds` is true, within a factor of it."""
-    return predicted, _edge(holds, predicted / factor, min(predicted * factor, LARGEST))
+    return predicted, bisected(holds, low, high, relative=1e-9, logarithmic=True)[0]
 
 
 def _run(scene: Scene, h: float, steps: int, every: int | None = None) -> Run:
@@ -183,11 +182,6 @@ def _apart(scene: Scene, height: float, h: float, steps: int) -> float:
     heights = height, height + _APART * float(np.spacing(height))
     ends = [_run(relaunched(scene, position=(x, y, z)), h, steps).end["velocity"][0, 2] for z in heights]
     return float(abs(ends[1] - ends[0]))
-
-
-def _square_of_frequency(scene: Scene) -> Found:
-    mass = scene.cube.mass
-    return LARGEST * mass / 4, _edge(lambda stiffness: 4 * stiffness / mass < math.inf, 1.0, LARGEST)
 
 
 def _first_contact(scene: Scene, coarse: int) -> Found:

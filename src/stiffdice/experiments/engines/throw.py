@@ -34,9 +34,6 @@ _PARTS = (64, 16, 4, 1)
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-11)
 
 
-# The places of a run [m], shape (time, 3), its steps, tolerance and force evaluations.
-_Made = tuple[Array, int, float, int]
-
 _DESCRIBED = {
     "position": ("centre of mass", "m", "effort", "time", "axis"),
     "distance": ("distance of the centre from the reference", "m", "effort", "time"),
@@ -61,13 +58,23 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     names = [name for name, why in reasons.items() if why is None]
     if not names:
         raise InputError(f"methods: none of them can represent the scene: {'; '.join(map(str, reasons.values()))}")
-    (reference, *_), (coarser, *_) = (_made(REFERENCE, scene, samples, samples, size) for size in (_FINEST, _COARSER))
+    start = start_of(scene, MODEL)
 
-    def efforts(method: str) -> list[Any]:
-        position, *others = zip(*_runs(method, scene, samples, most), strict=True)
+    def path(method: str, steps: int, tolerance: float) -> tuple[Array, int]:
+        states, evaluations = followed(method, scene, MODEL, start, samples, steps, tolerance)
+        return states["position"], evaluations
+
+    (reference, _), (coarser, _) = (path(REFERENCE, samples, size) for size in (_FINEST, _COARSER))
+
+    def efforts(method: str) -> tuple[Any, ...]:
+        own, finest = stepper.own_steps(method), most / stepper.dearness(method)
+        counts = [samples * max(1, round(finest / part / samples)) for part in _PARTS]
+        tried = [(samples, size) for size in _TOLERANCES] if own else [(count, schemes.TOLERANCE) for count in counts]
+        places, evaluations = zip(*(path(method, *effort) for effort in tried), strict=True)
         with np.errstate(all="ignore"):  # a run that blew up
-            distance = np.linalg.norm(np.array(position) - reference, axis=-1)
-        return [position, distance, *others]
+            distance = np.linalg.norm(np.array(places) - reference, axis=-1)
+        steps, tolerances = ([0] * len(tried), _TOLERANCES) if own else (counts, [np.nan] * len(tried))
+        return places, distance, steps, tolerances, evaluations
 
     time = np.arange(samples + 1) / samples * scene.duration
     found = mapped(efforts, _DESCRIBED, method=names) | coordinates(time=time, axis=dataset.AXES)
@@ -77,17 +84,3 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     attributes = dataset.provenance_attributes("The throw in every engine", scene, MODEL, "method", __name__)
     unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
     return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit})
-
-
-def _runs(method: str, scene: Scene, samples: int, most: float) -> list[_Made]:
-    """Return the runs of a method at its efforts."""
-    if stepper.own_steps(method):
-        return [_made(method, scene, samples, samples, tolerance) for tolerance in _TOLERANCES]
-    finest = most / stepper.dearness(method)
-    return [_made(method, scene, samples, samples * max(1, round(finest / part / samples))) for part in _PARTS]
-
-
-def _made(method: str, scene: Scene, samples: int, steps: int, tolerance: float = np.nan) -> _Made:
-    wanted = schemes.TOLERANCE if np.isnan(tolerance) else tolerance
-    states, evaluations = followed(method, scene, MODEL, start_of(scene, MODEL), samples, steps, wanted)
-    return states["position"], 0 if stepper.own_steps(method) else steps, tolerance, evaluations
