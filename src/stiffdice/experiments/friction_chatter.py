@@ -20,7 +20,8 @@ from stiffdice.experiments.measuring import mapped, numbers
 from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import dataset, fixed_step
+from stiffdice.simulation import dataset
+from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -81,5 +82,5 @@ def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
     steps += round(2.5 * friction * flat.gravity * h / physics_of(flat).cutoff)
     still = STARTS["at_rest"](flat.with_ground(friction=friction))
     sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
-    run = fixed_step.prepare(dataclasses.replace(sliding, duration=h * steps), MODEL, SCHEME, steps, steps)
-    return float(np.abs(run().states["velocity"][-_LAST:, 0]).max())
+    start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * steps), MODEL, steps, steps)
+    return float(np.abs(start()().states["velocity"][-_LAST:, 0]).max())

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.state import Array
-from stiffdice.experiments.measuring import coordinates, followed, mapped, numbers
+from stiffdice.dynamics.state import STATE, Array
+from stiffdice.experiments.measuring import coordinates, mapped, numbers
 from stiffdice.experiments.placement import relaunched
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
+from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.initial_conditions import turned
 
 MODEL, SCHEME = "tumbling", "event"
@@ -68,12 +69,13 @@ def measure(
         rough, start = scene.with_ground(friction=friction, stiffness=stiffness), starts[launch : launch + 1]
 
         def path(method: str, size: float) -> tuple[Array, int]:
-            states, evaluations = followed(method, rough, MODEL, start, SAMPLES, SAMPLES, size)
+            states = np.zeros(SAMPLES, STATE)
+            evaluations = stepper.start(method, rough, MODEL, start, scene.duration / SAMPLES, size).advance(states, 1)
             return states["position"], evaluations
 
         right, reference = path("scipy", _REFERENCE)
         paths, counts = zip(*(path(SCHEME, size) for size in tolerances), strict=True)
-        away = np.array([*paths, path("scipy", _COARSER)[0]])[:, 1:] - right[1:]
+        away = np.array([*paths, path("scipy", _COARSER)[0]]) - right
         apart = np.sqrt((away**2).sum(axis=-1).mean(axis=-1)) / scene.cube.radius
         return apart[:-1], counts, apart[-1], reference
 

@@ -13,9 +13,7 @@ from stiffdice.dynamics.state import STATE, Array, States
 from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.run import Run
 
 # What xarray takes for a variable: dimensions, values, attributes.
@@ -107,18 +105,6 @@ def states_of(run: Run, parts: int) -> States:
     known = found.state[found.step % (run.steps // parts) == 0]
     states[: len(known)] = known
     return states
-
-
-def followed(
-    method: str, scene: Scene, model: str, launch: States, samples: int, steps: int, tolerance: float
-) -> tuple[States, int]:
-    """Return states at the launch, shape (1,), and after equal parts of the duration, and force evaluations.
-
-    method: a scheme or an engine, without anything taken at once. Result shape (samples + 1,).
-    """
-    states = np.concatenate([launch, np.zeros(samples, STATE)])
-    engine = stepper.start(method, scene, model, launch, scene.duration / steps, tolerance)
-    return states, engine.advance(states[1:], steps // samples)
 
 
 def quantity(dimensions: str | Sequence[str], values: Any, meaning: str, unit: str = "1") -> Variable:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.state import Array, start_of
+from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import coordinates, followed, mapped, quantity
+from stiffdice.experiments.measuring import coordinates, mapped, quantity
 from stiffdice.experiments.work_precision.effort import EFFORTS
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
@@ -58,23 +58,22 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     names = [name for name, why in reasons.items() if why is None]
     if not names:
         raise InputError(f"methods: none of them can represent the scene: {'; '.join(map(str, reasons.values()))}")
-    start = start_of(scene, MODEL)
 
     def path(method: str, steps: int, tolerance: float) -> tuple[Array, int]:
-        states, evaluations = followed(method, scene, MODEL, start, samples, steps, tolerance)
-        return states["position"], evaluations
+        found = stepper.ready(method, scene, MODEL, steps, samples, tolerance)()()
+        return found.states["position"], found.evaluations
 
     (reference, _), (coarser, _) = (path(REFERENCE, samples, size) for size in (_FINEST, _COARSER))
 
     def efforts(method: str) -> tuple[Any, ...]:
         own, finest = stepper.own_steps(method), most / stepper.dearness(method)
         counts = [samples * max(1, round(finest / part / samples)) for part in _PARTS]
-        tried = [(samples, size) for size in _TOLERANCES] if own else [(count, schemes.TOLERANCE) for count in counts]
+        tried = [(samples, size) for size in _TOLERANCES] if own else [(count, np.nan) for count in counts]
         places, evaluations = zip(*(path(method, *effort) for effort in tried), strict=True)
         with np.errstate(all="ignore"):  # a run that blew up
             distance = np.linalg.norm(np.array(places) - reference, axis=-1)
-        steps, tolerances = ([0] * len(tried), _TOLERANCES) if own else (counts, [np.nan] * len(tried))
-        return places, distance, steps, tolerances, evaluations
+        steps, tolerances = zip(*tried, strict=True)
+        return places, distance, np.zeros_like(steps) if own else steps, tolerances, evaluations
 
     time = np.arange(samples + 1) / samples * scene.duration
     found = mapped(efforts, _DESCRIBED, method=names) | coordinates(time=time, axis=dataset.AXES)

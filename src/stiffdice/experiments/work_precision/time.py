@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 
 import xarray as xr
 
-from stiffdice.dynamics.state import start_of
 from stiffdice.experiments.measuring import coordinates, numbers, quantity
 from stiffdice.experiments.timing import Launched, interleaved, machine, seconds_of
 from stiffdice.experiments.work_precision.effort import (
@@ -25,7 +24,6 @@ from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
-from stiffdice.simulation.engines.registry import ENGINES
 
 # A run on a ladder, to be timed.
 Rung = tuple[Effort, Callable[[], object]]
@@ -84,7 +82,7 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
     for effort in ladder(scene, method, per_decade, math.inf):
         if fixed_step(method) and rungs and took * effort.steps / rungs[-1][0].steps > affordable:
             break
-        run = _timed(problem, scene, method, effort)
+        run = Launched(plain(problem, scene, method, effort))
         if not rungs:  # it may compile
             run()
         took = seconds_of(run)
@@ -92,11 +90,3 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
         if took > _END * affordable:
             break
     return rungs[-_RUNGS:] if fixed_step(method) else rungs
-
-
-def _timed(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], object]:
-    """Return a run to be timed; an engine builds its model of the scene before."""
-    if method not in ENGINES:
-        return plain(problem, scene, method, effort)
-    launch = start_of(scene, problem.model)
-    return Launched(stepper.ready(method, scene, problem.model, launch, effort.steps, SAMPLES))
