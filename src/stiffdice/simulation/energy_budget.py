@@ -43,8 +43,8 @@ BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
 
 LARGEST = 10_000  # bounces whose rows are kept
 
-# Steps made and booked at once: some hundredths of a second.
-_AT_ONCE = 10_000
+# Steps made and booked at once: what caches hold.
+_AT_ONCE = 2_000
 
 # A step that books more [J] ends the ledger, so that all sums of what is booked stay within doubles.
 LARGEST_WORK = 1e290
