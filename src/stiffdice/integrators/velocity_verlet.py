@@ -11,28 +11,21 @@ which is why the next step cannot take it over.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.integrators.free_flight import plus
 
-
-class VelocityVerlet(NamedTuple):
-    """The tag of this scheme."""
-
-
+VelocityVerlet = namedtuple("VelocityVerlet", ())
 TAG = VelocityVerlet()
-
-# One step of h, as files tell it.
 FORMULA = (
     "u += h a/2; L += h torque/2; x += h u; nodes turned by h L/I; u += h a/2; L += h torque/2, predicted and "
     "corrected once"
 )
-
-# The velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2.
-LAG = 0.0
+LAG = 0.0  # the velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2
 
 
 @njit

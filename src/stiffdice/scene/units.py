@@ -85,27 +85,14 @@ def _symbol(text: str) -> Unit | None:
     return known
 
 
-def _parts(text: str) -> re.Match[str] | None:
-    """Return mantissa, exponent and unit of a text; none if it does not look like a number with a unit."""
-    return _VALUE.fullmatch(text) if len(text) <= _LONGEST else None
-
-
-def has_unit(text: str, unit: str) -> bool:
-    """Return whether a text is a number with a unit of the dimensions of `unit`."""
-    found, wanted = _parts(text), unit_of(unit)
-    given = unit_of(found[3]) if found else None
-    return given is not None and wanted is not None and given.dimensions == wanted.dimensions
-
-
 def in_si(text: str, unit: str) -> float:
     """Return the number [unit] that a text such as `16 mm` stands for; unit: an SI unit, as `kg/s²`.
 
     Raises ValueError with what is wrong in words, empty if it does not look like a number with a unit at all.
     """
-    comma = decimal_comma(text)
-    if comma:
+    if comma := decimal_comma(text):
         raise ValueError(comma)
-    found, wanted = _parts(text), unit_of(unit)
+    found, wanted = _VALUE.fullmatch(text) if len(text) <= _LONGEST else None, unit_of(unit)
     if found is None:
         raise ValueError
     given = unit_of(found[3])

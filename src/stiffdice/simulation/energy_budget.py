@@ -31,6 +31,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import LAWS, height_of, node_force, normal_force, reaches
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import Array, Physics, States, physics_of, start_of
+from stiffdice.dynamics.vector import Vector
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
@@ -239,7 +240,7 @@ def _feel(law: Any, physics: Physics, weightless: Physics, state: Any, forces: A
         vy = uy + (wz * rx - wx * rz)
         vz = uz + (wx * ry - wy * rx)
         speed = physics.nx * vx + physics.ny * vy + physics.nz * vz
-        fx, fy, fz = node_force(law, weightless, depth, vx, vy, vz)
+        fx, fy, fz = node_force(law, weightless, depth, Vector(vx, vy, vz))
         if depth > 0.0:
             spring = physics.stiffness * depth
             push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
