@@ -22,18 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from stiffdice.dynamics import contact
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import (
-    height_of,
-    node_velocity,
-    normal_force,
-    normal_of,
-    normal_slopes,
-    reaches,
-    speed_of,
-    split,
-    upward,
-)
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
 from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, unit, vector
@@ -52,8 +42,10 @@ _EVERY_NODE = -1  # in bits
 def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     weight = 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    height = height_of(physics, state) + h * (speed_of(physics, state) - h * physics.gravity * physics.nz)
-    if not reaches(law, height - physics.reach):
+    height = contact.height_of(physics, state) + h * (
+        contact.speed_of(physics, state) - h * physics.gravity * physics.nz
+    )
+    if not contact.reaches(law, height - physics.reach):
         models.kick(model, physics, state, weight, h)
         models.drift(model, physics, state, h)
         return 1
@@ -73,7 +65,7 @@ def _slips(physics: Physics, state: Any) -> Array:
     """Return each node's speed along the ground, cutoff added, shape (node,) [m/s]."""
     slips = np.empty(state.node_offset.shape[0])
     for k in range(slips.shape[0]):
-        slips[k] = norm(split(physics, node_velocity(state, k))[1]) + physics.cutoff
+        slips[k] = norm(contact.split(physics, contact.node_velocity(state, k))[1]) + physics.cutoff
     return slips
 
 
@@ -118,12 +110,12 @@ def _assemble(
     pressing = 0
     for k in range(slips.shape[0]):
         arm = row(state.node_offset, k)
-        depth = -upward(physics, plus(vector(state.position), arm))
-        speed, slip = split(physics, node_velocity(state, k))
-        push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
-        by_depth, by_speed = normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
+        depth = -contact.upward(physics, plus(vector(state.position), arm))
+        speed, slip = contact.split(physics, contact.node_velocity(state, k))
+        push = contact.normal_force(law, depth, speed, physics.stiffness, physics.damping)
+        by_depth, by_speed = contact.normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
         stiffening = h * by_depth - by_speed
-        along = _lever(arm, normal_of(physics))
+        along = _lever(arm, contact.normal_of(physics))
         pressed = push - stiffening * _dot(along, change)
         if (nodes >> k) & 1 == 0 or pressed <= 0.0:
             continue

@@ -236,24 +236,18 @@ def cross_zero(contact: Contact, motion: Any, switch: int) -> None:
 @njit
 def take(turning: bool, state: Any, motion: Any) -> None:
     """Set a motion to a state's, not turned yet."""
-    for axis in range(3):
-        motion[axis] = state.position[axis]
-        motion[3 + axis] = state.velocity[axis]
-        motion[6 + axis] = state.angular_momentum[axis] if turning else 0.0
-        motion[10 + axis] = 0.0
+    motion[:3], motion[3:6], motion[6:9], motion[9:13] = state.position, state.velocity, 0.0, 0.0
     motion[9] = 1.0
+    if turning:
+        motion[6:9] = state.angular_momentum
 
 
 @njit
 def give(contact: Contact, motion: Any, state: Any) -> None:
     """Set a state to a motion's, turning the nodes it began with."""
-    for axis in range(3):
-        state.position[axis] = motion[axis]
-        state.velocity[axis] = motion[3 + axis]
-        if contact.turning:
-            state.angular_momentum[axis] = motion[6 + axis]
-            state.angular_velocity[axis] = motion[6 + axis] / contact.physics.inertia
+    state.position[:], state.velocity[:] = motion[:3], motion[3:6]
     if contact.turning:
+        state.angular_momentum[:], state.angular_velocity[:] = motion[6:9], motion[6:9] / contact.physics.inertia
         for k in range(NODES):
             x, y, z = _turned(motion, 1.0, row(contact.nodes, k))
             state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = x, y, z

@@ -23,24 +23,8 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.event_driven import dop853, radau_iia
-from stiffdice.integrators.event_driven.active_set import (
-    NODES,
-    SIZE,
-    SWITCHES,
-    Contact,
-    begin,
-    cross_zero,
-    derivative,
-    fastest,
-    give,
-    hardness,
-    normalise,
-    passes,
-    switches,
-    take,
-    vanishing,
-)
+from stiffdice.integrators.event_driven import active_set, dop853, radau_iia
+from stiffdice.integrators.event_driven.active_set import NODES, SIZE, SWITCHES, Contact, derivative, passes
 from stiffdice.integrators.event_driven.touchdown import free_time
 from stiffdice.integrators.free_flight import flight
 
@@ -144,13 +128,13 @@ def _go_through(
     work = room[0]
     work.nodes[:] = state.node_offset
     work.scale[:] = 1.0
-    take(contact.turning, state, work.here)
-    vanishing(contact.physics, work.here, work.small)
-    begin(contact, work.here, work.small)
+    active_set.take(contact.turning, state, work.here)
+    active_set.vanishing(contact.physics, work.here, work.small)
+    active_set.begin(contact, work.here, work.small)
     _look(contact, work, work.here, 0, 0)
     time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
     while time < most and evaluations < effort and (contact.dragging or np.any(work.bits)):
-        hardness(contact, work.here, work.hard)
+        active_set.hardness(contact, work.here, work.hard)
         if h == 0.0:
             h = _first(contact.physics, work, tolerance)
         pace, slowest = min(h, most - time), max(work.hard[0], 1.0 / most)
@@ -188,7 +172,7 @@ def _go_through(
             _look(contact, work, work.here, 0, 0)
         if not math.isfinite(work.here[2]):
             break
-    give(contact, work.here, state)
+    active_set.give(contact, work.here, state)
     return time, evaluations
 
 
@@ -197,13 +181,13 @@ def _look(contact: Contact, work: Any, motion: Any, stage: int, end: int) -> Non
     """Evaluate rate and switches of the motion at the start of a step (stage 0, end 0) or at its end (the last, 1)."""
     rate = work.stages[stage]
     derivative(contact, motion, rate)
-    switches(contact, motion, rate, work.value[end], work.slope[end])
+    active_set.switches(contact, motion, rate, work.value[end], work.slope[end])
 
 
 @njit
 def _move_on(work: Any) -> None:
     """Start from where the step ended."""
-    normalise(work.there)
+    active_set.normalise(work.there)
     work.here[:] = work.there
     work.stages[0] = work.stages[dop853.STAGES]
     work.value[0] = work.value[1]
@@ -214,8 +198,8 @@ def _move_on(work: Any) -> None:
 def _tolerate(physics: Physics, work: Any, tolerance: float) -> None:
     """Set what error is tolerated of each part of the motion in a step."""
     here, scale, hard = work.here, work.scale, work.hard
-    vanishing(physics, here, work.small)
-    speed = fastest(physics, here)
+    active_set.vanishing(physics, here, work.small)
+    speed = active_set.fastest(physics, here)
     if hard[0] * physics.reach > hard[2]:
         length, pace = hard[2] / hard[0], hard[2]
     else:
@@ -366,7 +350,7 @@ def _cross_zeros(contact: Contact, work: Any) -> bool:
     for node in range(NODES):
         for switch in (2 * node, 2 * node + 1):
             if _falls_to_zero(work, switch):
-                cross_zero(contact, work.there, switch)
+                active_set.cross_zero(contact, work.there, switch)
                 crossed = True
                 break
     return crossed

@@ -15,9 +15,8 @@ Motion that repeats is taken at once: a cube that swings about its rest without 
 of its amplitude in every cycle, as the forces are then homogeneous in place and speed. What is left of a swing below
 the round-off of the place is taken for rest.
 
-A step of any length is exact, to round-off and what the motion makes of that. Stored in a state, a place has an error
-of half a unit in the last place, which deep in a contact is as much as ω times that in the speed: few long steps are
-more precise than many short ones.
+A step of any length is exact, to round-off and what the motion makes of that. A stored place is off by half a unit in
+the last place, which deep in a contact is as much as ω times that in the speed: long steps are more precise.
 """
 
 from __future__ import annotations
