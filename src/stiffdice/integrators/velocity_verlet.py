@@ -5,8 +5,7 @@ particle dynamics, the new velocity is predicted by the old force, u + h F/m, th
 the kick is corrected by it (Groot and Warren 1997, J. Chem. Phys. 107, 4423, with λ = 1: with their λ = 1/2, or with
 the velocity at the half step, the order is one). So it is of second order with damping and friction; without either it
 is the classical scheme, symplectic and linearly stable for ωh < 2 (Hairer, Lubich and Wanner, Geometric Numerical
-Integration, I.1.4). Two evaluations a step: the last force is at the predicted velocity, not at that of the state,
-which is why the next step cannot take it over.
+Integration, I.1.4). The next step cannot take over the last force: it is at the predicted velocity.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Units that people write after a number, and the number in SI.
 
-A table and not a library of all units: nine symbols with their prefixes are what a scene's quantities have. A prefix
-moves the decimal exponent of the text before it is rounded, so that `16.1 mm` is the same double as `0.0161`, and two
-scenes that say the same have one digest; a product of two floats would not be.
+A prefix moves the decimal exponent of the text before it is rounded, so that `16.1 mm` is the same double as `0.0161`,
+and two scenes that say the same have one digest; a product of two floats, as libraries of units have, would not be.
 """
 
 from __future__ import annotations

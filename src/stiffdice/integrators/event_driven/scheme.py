@@ -4,9 +4,8 @@ A flight is a parabola and a turn at constant spin; its touch-down is found to r
 the motion obeys smooth equations until a node crosses the ground or the force on one reaches zero (`active_set.py`).
 Each such event is located to round-off, and the integrator starts anew behind it, so that it keeps its order: it is
 Dormand and Prince's method of order 8 (`dop853.py`), or where friction holds a node, whose motion is stiff then,
-Radau's of order 9 (`radau_iia.py`). Steps scale with the contact's time, so that their number does not depend on the
-stiffness. The tolerance is of a step's error, relative to the motion of the contact: to its speed, and to that over its
-frequency as length.
+Radau's of order 9 (`radau_iia.py`). Steps scale with the contact's time. The tolerance is of a step's error, relative
+to the motion of the contact: to its speed, and to that over its frequency as length.
 
 Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.6 (step size, events).
 """

@@ -11,9 +11,8 @@ zero of a function known in closed form, and so are the zeros of its derivative:
 first event is bracketed, never stepped over. Friction on level ground follows from the normal impulse
 (`regularised_friction.py`).
 
-Motion that repeats is taken at once: a cube that swings about its rest without leaving the ground loses the same share
-of its amplitude in every cycle, as the forces are then homogeneous in place and speed. What is left of a swing below
-the round-off of the place is taken for rest.
+Swings about the rest that never leave the ground are taken at once: each cycle loses the same share of the amplitude,
+as the forces are then homogeneous in place and speed. What is left of a swing below the round-off of the place is rest.
 
 A step of any length is exact, to round-off and what the motion makes of that. A stored place is off by half a unit in
 the last place, which deep in a contact is as much as ω times that in the speed: long steps are more precise.
