@@ -246,6 +246,8 @@ def _override(data: Any, text: str) -> Any:
         raise error.within(f"--set {text}") from None
     result = dict(validation.known_keys("", _given(data), _TOP_KEYS))
     if len(keys) == 1:
+        if keys[0] in _SECTIONS:
+            validation.known_keys(keys[0], value, _KEYS[keys[0]])
         return result | {keys[0]: value}
     if keys[0] not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
         known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]
