@@ -59,7 +59,9 @@ def physics_of(scene: Scene) -> Physics:
     """Return the scene's numbers as a kernel takes them."""
     cube, ground, nodes = scene.cube, scene.ground, scene.cube.node_offsets()
     node_weight = cube.mass / len(nodes) * scene.gravity
-    weight = float(np.cumsum(np.full(len(nodes), node_weight))[-1])  # one by one
+    weight = 0.0
+    for _ in nodes:
+        weight += node_weight
     # The margin covers what rotating the nodes step by step can add in round-off.
     reach = float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6)
     forces = ground.stiffness, ground.damping, ground.friction, *ground.normal, 1e-6 * cube.radius

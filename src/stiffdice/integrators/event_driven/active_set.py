@@ -243,13 +243,17 @@ def take(turning: bool, state: Any, motion: Any) -> None:
 
 
 @njit
-def give(contact: Contact, motion: Any, state: Any) -> None:
+def give(turning: bool, physics: Any, nodes: Any, motion: Any, state: Any) -> None:
     """Set a state to a motion's, turning the nodes it began with."""
-    state.position[:], state.velocity[:] = motion[:3], motion[3:6]
-    if contact.turning:
-        state.angular_momentum[:], state.angular_velocity[:] = motion[6:9], motion[6:9] / contact.physics.inertia
+    for axis in range(3):
+        state.position[axis] = motion[axis]
+        state.velocity[axis] = motion[3 + axis]
+        if turning:
+            state.angular_momentum[axis] = motion[6 + axis]
+            state.angular_velocity[axis] = motion[6 + axis] / physics.inertia
+    if turning:
         for k in range(NODES):
-            x, y, z = _turned(motion, 1.0, row(contact.nodes, k))
+            x, y, z = _turned(motion, 1.0, row(nodes, k))
             state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = x, y, z
 
 

@@ -171,7 +171,7 @@ def _go_through(
             _look(contact, work, work.here, 0, 0)
         if not math.isfinite(work.here[2]):
             break
-    active_set.give(contact, work.here, state)
+    active_set.give(contact.turning, contact.physics, contact.nodes, work.here, state)
     return time, evaluations
 
 
