@@ -57,8 +57,10 @@ def landing(law, stiffness=1e4, height=0.4, **ground):
 def begun(scene, model="tumbling"):
     """The contact in which a scene begins, and the motion."""
     launch, motion = start_of(scene, model), np.zeros(active_set.SIZE)
-    nodes, dragging = launch["node_offset"][0].copy(), scene.ground.contact == "ungated"
-    contact = active_set.Contact(model == "tumbling", dragging, physics_of(scene), nodes, np.zeros(8, np.int8))
+    regime = np.zeros(1, [("nodes", np.float64, (8, 3)), ("bits", np.int8, 8)])
+    regime["nodes"] = launch["node_offset"]
+    dragging = scene.ground.contact == "ungated"
+    contact = active_set.Contact(model == "tumbling", dragging, physics_of(scene), regime[0])
     begin(contact, launch, motion)
     return contact, motion
 
@@ -81,7 +83,7 @@ def test_the_forces_are_those_of_the_law(law, model):
         np.testing.assert_allclose(rate[3:6] * scene.cube.mass, wrench[:3], rtol=1e-12, atol=1e-10)
         if model == "tumbling":
             np.testing.assert_allclose(rate[6:9], wrench[3:], rtol=1e-12, atol=1e-9)
-        touched += bool(contact.bits.any())
+        touched += bool(contact.regime["bits"].any())
     assert touched > 20
 
 

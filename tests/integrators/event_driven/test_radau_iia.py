@@ -42,7 +42,7 @@ def pressed(slip):
         }
     )
     contact, motion = begun(scene)
-    assert contact.bits.any()
+    assert contact.regime["bits"].any()
     return contact, motion
 
 
@@ -73,7 +73,7 @@ def test_both_integrators_have_their_orders(integrator, order, part):
 
 def slip_of(contact, motion):
     """How fast the node in the ground slides [m/s]."""
-    turned = rotated(contact.nodes, 2 * motion[10:13] / motion[9])[np.flatnonzero(contact.bits)[0]]
+    turned = rotated(contact.regime["nodes"], 2 * motion[10:13] / motion[9])[np.flatnonzero(contact.regime["bits"])[0]]
     velocity = motion[3:6] + np.cross(motion[6:9] / contact.physics.inertia, turned)
     return np.hypot(velocity[0], velocity[1])
 

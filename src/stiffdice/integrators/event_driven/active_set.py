@@ -36,14 +36,14 @@ _ULPS = 8 * 2.0**-52
 class Contact(NamedTuple):
     """turning: whether the body turns; dragging: whether the ground damps nodes above it.
 
-    nodes [m]: relative to the centre before they are turned, shape (8, 3). bits: the regime, of each node, shape (8,).
+    regime: a record, as arrays would be counted at every call: nodes [m], relative to the centre before they are
+    turned, shape (8, 3); bits, of each node, shape (8,).
     """
 
     turning: bool
     dragging: bool
     physics: Physics
-    nodes: Any
-    bits: Any
+    regime: Any
 
 
 class Node(NamedTuple):
@@ -85,7 +85,7 @@ def _turned(motion: Any, sense: float, v: Vector) -> Vector:
 @njit
 def _arm_and_velocity(contact: Contact, motion: Any, k: int) -> tuple[Vector, Vector]:
     """Return place relative to the centre [m] and velocity [m/s] of node k."""
-    arm, velocity = row(contact.nodes, k), part_of(motion, 3)
+    arm, velocity = row(contact.regime.nodes, k), part_of(motion, 3)
     if contact.turning:
         arm = _turned(motion, 1.0, arm)
         velocity = plus(velocity, cross(spin_of(contact.physics, motion), arm))
@@ -104,7 +104,7 @@ def node_of(contact: Contact, motion: Any, k: int) -> Node:
 def push_of(contact: Contact, k: int, node: Node) -> float:
     """Return the normal force [N] on node k, which is pushed."""
     push = -contact.physics.damping * node.speed
-    return push - contact.physics.stiffness * node.clearance if contact.bits[k] & BELOW else push
+    return push - contact.physics.stiffness * node.clearance if contact.regime.bits[k] & BELOW else push
 
 
 @njit
@@ -113,7 +113,7 @@ def derivative(contact: Contact, motion: Any, rate: Any) -> None:
     physics = contact.physics
     total, torque = Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     for k in range(NODES):
-        if contact.bits[k] & PUSHED:
+        if contact.regime.bits[k] & PUSHED:
             node = node_of(contact, motion, k)
             push = push_of(contact, k, node)
             grip = physics.friction * push / (norm(node.slip) + physics.cutoff)
@@ -149,10 +149,10 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
     centre_gain = upward(physics, part_of(rate, 3))
     level, turn, bend = _normals(contact, motion, rate)
     for k in range(NODES):
-        node = row(contact.nodes, k)
+        node = row(contact.regime.nodes, k)
         clearance = height + level.x * node.x + level.y * node.y + level.z * node.z
         speed = centre_speed + turn.x * node.x + turn.y * node.y + turn.z * node.z
-        below = contact.bits[k] & BELOW != 0
+        below = contact.regime.bits[k] & BELOW != 0
         value[2 * k], slope[2 * k] = (-clearance, -speed) if below else (clearance, speed)
         value[2 * k + 1], slope[2 * k + 1] = 1.0, 0.0
         if physics.damping == 0.0 or not (below or contact.dragging):
@@ -162,7 +162,7 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
         if below:
             push -= physics.stiffness * clearance
             change -= physics.stiffness * speed
-        pushed = contact.bits[k] & PUSHED != 0
+        pushed = contact.regime.bits[k] & PUSHED != 0
         value[2 * k + 1], slope[2 * k + 1] = (push, change) if pushed else (-push, -change)
 
 
@@ -209,7 +209,7 @@ def begin(contact: Contact, motion: Any, small: Any) -> None:
         node = node_of(contact, motion, k)
         # A node that is about at the ground is on the side to which it goes.
         below = node.speed < 0.0 if abs(node.clearance) <= small[0] else node.clearance < 0.0
-        contact.bits[k] = _answers(contact, below, node.clearance, node.speed)
+        contact.regime.bits[k] = _answers(contact, below, node.clearance, node.speed)
 
 
 @njit
@@ -227,10 +227,10 @@ def cross_zero(contact: Contact, motion: Any, switch: int) -> None:
     """Change the regime where a switch went through zero."""
     k = switch // 2
     if switch % 2:
-        contact.bits[k] ^= PUSHED
+        contact.regime.bits[k] ^= PUSHED
     else:
-        below = contact.bits[k] & BELOW == 0
-        contact.bits[k] = _answers(contact, below, 0.0, node_of(contact, motion, k).speed)
+        below = contact.regime.bits[k] & BELOW == 0
+        contact.regime.bits[k] = _answers(contact, below, 0.0, node_of(contact, motion, k).speed)
 
 
 @njit
@@ -272,7 +272,7 @@ def hardness(contact: Contact, motion: Any, hard: Any) -> None:
     The frequency is a bound, from the trace of M⁻¹ S Σ JᵀJ over the nodes below the ground; the speed is that of the
     contact's motion along the normal: the fastest node's, or what its depth or the weight stands for.
     """
-    physics, bits = contact.physics, contact.bits
+    physics, bits = contact.physics, contact.regime.bits
     square = rubbing = speed_most = depth_most = 0.0
     height, pliancy = upward(physics, part_of(motion, 0)), 1.0 / physics.mass
     for k in range(NODES):

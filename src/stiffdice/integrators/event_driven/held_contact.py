@@ -20,7 +20,7 @@ from stiffdice.integrators.event_driven.active_set import BELOW, NODES, PUSHED, 
 def slips(contact: Contact, motion: Any, about: Any) -> None:
     """Set the velocity along the ground [m/s] of each node that is pushed, shape (8, 3)."""
     for k in range(NODES):
-        if contact.bits[k] & PUSHED:
+        if contact.regime.bits[k] & PUSHED:
             about[k, 0], about[k, 1], about[k, 2] = node_of(contact, motion, k).slip
 
 
@@ -50,7 +50,7 @@ def retouch(contact: Contact, motion: Any, about: Any) -> float:
     """
     physics, off = contact.physics, 0.0
     for k in range(NODES):
-        if contact.bits[k] & PUSHED == 0:
+        if contact.regime.bits[k] & PUSHED == 0:
             continue
         here, there = row(about, k), node_of(contact, motion, k).slip
         length, most, apart = norm(here), norm(there), norm(minus(there, here))
@@ -70,13 +70,16 @@ def straighten(contact: Contact, motion: Any, about: Any, rate: Any) -> None:
     """Change a motion's rate to what it were, were friction by its tangent at the slips `about`, shape (8, 3)."""
     physics = contact.physics
     for k in range(NODES):
-        if contact.bits[k] & PUSHED == 0:
+        if contact.regime.bits[k] & PUSHED == 0:
             continue
         node = node_of(contact, motion, k)
         own = times(1.0 / (norm(node.slip) + physics.cutoff), node.slip)
         change = minus(own, _share(physics, row(about, k), node.slip))
         force = times(physics.friction * push_of(contact, k, node), change)
-        _add(physics, node.arm, force, Vector(0.0, 0.0, 0.0), rate[3:9])
+        torque = cross(node.arm, force)
+        for axis in range(3):
+            rate[3 + axis] += force[axis] / physics.mass
+            rate[6 + axis] += torque[axis]
 
 
 @njit
@@ -92,22 +95,22 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
     by_speed[:], by_place[:] = 0.0, 0.0
     spin, none = spin_of(physics, motion), Vector(0.0, 0.0, 0.0)
     for k in range(NODES):
-        if contact.bits[k] & PUSHED == 0:
+        if contact.regime.bits[k] & PUSHED == 0:
             continue
         node, tangent = node_of(contact, motion, k), row(about, k)
-        spring = physics.stiffness if contact.bits[k] & BELOW else 0.0
+        spring = physics.stiffness if contact.regime.bits[k] & BELOW else 0.0
         push = push_of(contact, k, node)
         line = plus_times(normal_of(physics), -physics.friction, _share(physics, tangent, node.slip))
         law = spring, push, line, tangent
         for axis in range(3):
             one = unit(axis)
-            _add(physics, node.arm, _force_change(physics, law, one, none), none, by_speed[:, axis])
-            _add(physics, node.arm, _force_change(physics, law, none, one), none, by_place[:, axis])
+            _add(physics, node.arm, _force_change(physics, law, one, none), none, by_speed, axis)
+            _add(physics, node.arm, _force_change(physics, law, none, one), none, by_place, axis)
             if contact.turning:
                 moved = times(1.0 / physics.inertia, cross(one, node.arm))
                 change = _force_change(physics, law, cross(spin, moved), moved)
-                _add(physics, node.arm, _force_change(physics, law, moved, none), none, by_speed[:, 3 + axis])
-                _add(physics, node.arm, change, cross(moved, times(push, line)), by_place[:, 3 + axis])
+                _add(physics, node.arm, _force_change(physics, law, moved, none), none, by_speed, 3 + axis)
+                _add(physics, node.arm, change, cross(moved, times(push, line)), by_place, 3 + axis)
 
 
 @njit
@@ -127,12 +130,9 @@ def _force_change(
 
 
 @njit
-def _add(physics: Physics, arm: Vector, force: Vector, torque: Vector, rate: Any) -> None:
-    """Add to u' and L', shape (6,), what a force on a node at `arm` does, and a torque."""
+def _add(physics: Physics, arm: Vector, force: Vector, torque: Vector, slope: Any, column: int) -> None:
+    """Add to a column of the slopes of u' and L' what a force on a node at `arm` does, and a torque."""
     turned = plus(cross(arm, force), torque)
-    rate[0] += force.x / physics.mass
-    rate[1] += force.y / physics.mass
-    rate[2] += force.z / physics.mass
-    rate[3] += turned.x
-    rate[4] += turned.y
-    rate[5] += turned.z
+    for axis in range(3):
+        slope[axis, column] += force[axis] / physics.mass
+        slope[3 + axis, column] += turned[axis]

@@ -116,7 +116,7 @@ def _touch(
     """
     # Kept here while it is used: a record does not keep its array alive.
     room = np.zeros(1, _WORK)
-    contact = Contact(turning, dragging, physics, room[0].nodes, room[0].bits)
+    contact = Contact(turning, dragging, physics, room[0])
     return _go_through(contact, state, most, tolerance, effort, room)
 
 
@@ -171,7 +171,7 @@ def _go_through(
             _look(contact, work, work.here, 0, 0)
         if not math.isfinite(work.here[2]):
             break
-    active_set.give(contact.turning, contact.physics, contact.nodes, work.here, state)
+    active_set.give(contact.turning, contact.physics, work.nodes, work.here, state)
     return time, evaluations
 
 
