@@ -9,7 +9,6 @@ from pathlib import Path
 
 from benchmarks import BENCHMARKS
 from benchmarks.run import bench
-from stiffdice.cli.common import name_of
 from stiffdice.cli.main import called
 from stiffdice.cli.progress import notes
 from stiffdice.scene import validation
@@ -45,12 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _bench(options: argparse.Namespace) -> None:
     for name in options.names:
         validation.choice("NAME", name, BENCHMARKS)
-
-    folder = name_of("--folder", options.folder)
-
     against = None if options.against is None else Path(options.against)
     with notes("bench:") as tell:
-        stored = bench(folder, names=options.names, quick=options.quick, against=against, tell=tell)
+        stored = bench(Path(options.folder), names=options.names, quick=options.quick, against=against, tell=tell)
     print(stored.page)
     print(f"{stored.path}: stored, with the same as .md and .csv")
 

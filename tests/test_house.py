@@ -161,9 +161,16 @@ def table(experiments, title):
     return rendered(title, ["what", "weight [N]"], [[name, float(data.weight)] for name, data in experiments.items()])
 """,
     "cli/greet.py": """
-def add(commands):
-    greet = commands.add_parser("greet")
-    greet.set_defaults(call=lambda options: print("hello"))
+HELP = "say hello"
+EXAMPLES = ""
+
+
+def add(greet):
+    pass
+
+
+def call(options):
+    print("hello")
 """,
     "benchmarks/nothing.py": """
 from benchmarks.case import Case

@@ -14,19 +14,16 @@ from urllib3 import HTTPResponse
 # that is not among them is told by the validator as one that the context does not have.
 CONTEXT = "https://w3id.org/ro/crate/1.1/context"
 _SCHEMA_ORG = """
-    CreateAction CreativeWork ComputerLanguage Dataset Organization Person PropertyValue QuantitativeValue
+    CreateAction CreativeWork ComputerLanguage Dataset Organization Person
     SoftwareApplication SoftwareSourceCode WebSite
-    about actionStatus additionalType affiliation agent author citation contentSize datePublished description
-    encodingFormat endTime exampleOfWork hasPart identifier input instrument keywords license mainEntity mentions name
-    object output programmingLanguage result size softwareRequirements softwareVersion startTime unitText url value
-    version workExample
+    about actionStatus affiliation agent author citation contentSize datePublished description
+    encodingFormat endTime hasPart identifier instrument keywords license mainEntity mentions name
+    object programmingLanguage result softwareRequirements softwareVersion startTime url
+    version
 """
 TERMS = {term: f"http://schema.org/{term}" for term in _SCHEMA_ORG.split()} | {
     "File": "http://schema.org/MediaObject",
     "ComputationalWorkflow": "https://bioschemas.org/ComputationalWorkflow",
-    "FormalParameter": "https://bioschemas.org/FormalParameter",
-    "input": "https://bioschemas.org/ComputationalWorkflow#input",
-    "output": "https://bioschemas.org/ComputationalWorkflow#output",
     "conformsTo": "http://purl.org/dc/terms/conformsTo",
 }
 

@@ -154,7 +154,7 @@ def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
     assert (kept / REBUILT / "results/tiny/same.txt").read_text() == "same"
     assert (kept / ARCHIVED / "results/tiny/same.txt").read_text() == "same but for this"
     assert main(["rebuild", "--yes", str(path), "-o", str(kept)]) == 2
-    assert "is not empty" in capsys.readouterr().err
+    assert "File exists; name a new folder" in capsys.readouterr().err
 
 
 @pytest.mark.workflow
@@ -255,11 +255,16 @@ def test_without_a_sandbox_other_code_is_not_run(project, tmp_path, monkeypatch,
 def test_a_run_is_ended_by_an_error_of_who_waits_for_it(project, tmp_path):
     (project / "workflow/run.py").write_text(STUBBORN)
 
-    def tell(text: str) -> None:
+    def stop(number, frame):
         raise InterruptedError
 
-    with opened(packed(project, tmp_path / "a.zip")) as unpacked, pytest.raises(InterruptedError):
-        rebuild(unpacked, way_of(unpacked, in_sandbox=False), tell=tell)
+    before = signal.signal(signal.SIGALRM, stop)
+    with opened(packed(project, tmp_path / "a.zip")) as unpacked:
+        way = way_of(unpacked, in_sandbox=False)
+        signal.setitimer(signal.ITIMER_REAL, 2.0)
+        with pytest.raises(InterruptedError):
+            rebuild(unpacked, way)
+    signal.signal(signal.SIGALRM, before)
     assert [child for child in psutil.Process().children(recursive=True) if str(tmp_path) in child.cwd()] == []
 
 

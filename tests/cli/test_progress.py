@@ -36,6 +36,6 @@ def test_a_long_run_says_how_long_it_will_take(clock, capsys):
 @pytest.mark.parametrize(("quiet", "told"), [(0.0, "stiffdice: planning the sweeps of x ...\n"), (60.0, "")])
 def test_what_takes_long_is_said_once(monkeypatch, capsys, quiet, told):
     monkeypatch.setattr(progress, "QUIET_SECONDS", quiet)
-    with progress.told_if_slow("planning the sweeps of x"):
+    with progress.notes("stiffdice: planning the sweeps of x"):
         time.sleep(0.2)
     assert capsys.readouterr().err == told

@@ -117,3 +117,20 @@ def test_forward_euler_is_stable_up_to_its_limit_and_no_further(zeta):
 @pytest.mark.parametrize(("scheme", "limit"), [("velocity_verlet", 2), ("rk4", 2 * math.sqrt(2))])
 def test_undamped_limits_are_those_of_the_textbook(scheme, limit):
     assert stability_limit(scheme, 0.0) == pytest.approx(limit, rel=1e-6)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.1, 0.7, 3.0])
+def test_limits_are_those_of_theory(zeta):
+    """Those of two schemes by a formula, of two by their polynomials: −1 is a root there (Verlet), or |R| = 1."""
+    assert stability_limit("symplectic_euler", zeta) == linear_theory.stability_limit(zeta)
+    forward = 2 * zeta if zeta <= 1 else 2 / (zeta + (zeta**2 - 1) ** 0.5)
+    assert stability_limit("forward_euler", zeta) == pytest.approx(forward)
+    q = stability_limit("rk4", zeta)
+    root = q * (-zeta + 1j * np.emath.sqrt(1 - zeta**2))
+    other = q * (-zeta - 1j * np.emath.sqrt(1 - zeta**2))
+    sizes = [abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24) for z in (root, other)]
+    assert max(sizes) == pytest.approx(1, abs=1e-9)
+    assert stability_limit("implicit_euler", zeta) == np.inf
+    if zeta == 0:
+        assert stability_limit("velocity_verlet", 0) == pytest.approx(2)
+        assert q == pytest.approx(8**0.5)

@@ -30,7 +30,8 @@ def test_a_number_is_rounded_before_its_form_is_chosen():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(12.34, "12.3 s"), (0.5, "500 ms"), (2.5e-5, "25 µs"), (3e-9, "3 ns"), (np.nan, "nan ns")]
+    ("seconds", "text"),
+    [(12.34, "12.3 s"), (0.5, "500 ms"), (2.5e-5, "25 µs"), (3e-9, "3 ns"), (1e8, "3.17 years"), (np.nan, "nan ns")],
 )
 def test_a_time_is_written_in_its_unit(seconds, text):
     assert number_format.duration(seconds) == text

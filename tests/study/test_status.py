@@ -458,4 +458,4 @@ def test_outside_of_a_project_it_says_so(project, monkeypatch, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert project("quick")[0] == 2
-    assert "call stiffdice status in the project's folder" in project()[2]
+    assert "in the project's folder" in project()[2]

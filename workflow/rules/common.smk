@@ -6,7 +6,7 @@ import time
 from functools import cache
 from pathlib import Path
 
-from stiffdice.cli.progress import told_if_slow
+from stiffdice.cli.progress import notes
 from stiffdice.errors import InputError, printable
 from stiffdice.study import config as studies
 from stiffdice.study import job_log
@@ -40,7 +40,7 @@ wildcard_constraints:
 def study(name):
     """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
     try:
-        with told_if_slow(f"reading config/{name}.yaml"):
+        with notes(f"stiffdice: reading config/{name}.yaml"):
             return studies.load(f"config/{name}.yaml", SCHEMA)
     except InputError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
@@ -50,7 +50,7 @@ def study(name):
 @cache
 def planned_results(name):
     """Return all results of a study; a link to nothing in the place of one ends Snakemake with exit status 2."""
-    with told_if_slow(f"planning the sweeps of {name}"):
+    with notes(f"stiffdice: planning the sweeps of {name}"):
         found = results.of(study(name))
     for line in filter(None, (results.dangling(result, Path("results", name)) for result in found)):
         print(f"stiffdice: {printable(line)}", file=sys.stderr)

@@ -76,18 +76,14 @@ def _finer(advice: Advice, run: Run, progress: Callable[[float], None] | None) -
 def _run(
     advice: Advice, scheme: str, steps: int, tolerance: float | None, progress: Callable[[float], None] | None
 ) -> Run:
+    """Return a run that keeps the samples' times, and as many states between them as come to 10,000 at most."""
+    between = steps // SAMPLES
     return simulate(
         advice.scene,
         model=advice.model,
         scheme=scheme,
         steps=steps,
         tolerance=schemes.TOLERANCE if tolerance is None else tolerance,
-        every=every_of(steps),
+        every=between // max(part for part in range(1, 17) if between % part == 0),
         progress=progress,
     )
-
-
-def every_of(steps: int) -> int:
-    """Return the K that keeps the samples' times, and as many states between them as come to 10,000 at most."""
-    between = steps // SAMPLES
-    return between // max(part for part in range(1, 17) if between % part == 0)

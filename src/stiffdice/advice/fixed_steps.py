@@ -48,57 +48,52 @@ _SECOND_ORDER = frozenset({"velocity_verlet", "rk4"})
 
 
 class Search(NamedTuple):
-    """A scheme of fixed steps on a pilot's scene.
+    """What all schemes of fixed steps are tried with on a pilot's scene.
 
     hardest: the fastest contact. shape: how a small error grows, shape (SAMPLES + 1,), up to a factor. budget: steps
     that a run may compute one by one.
     """
 
     pilot: Pilot
-    scheme: str
     hardest: linear_stability.Hardest
     shape: Array
     budget: int
 
-    def option(self, error: float) -> Option:
-        """Return how many steps an error [radii] takes."""
+    def option(self, scheme: str, error: float) -> Option:
+        """Return how many steps of a scheme an error [radii] takes."""
         pilot, runs, keeping = self.pilot, list[tuple[Trial, Array]](), 0
-        for steps in self._ladder():
-            trial = tried(pilot.scene, pilot.model, self.scheme, steps, budget=self.budget)
+        for steps in self._ladder(scheme):
+            trial = tried(pilot.scene, pilot.model, scheme, steps, budget=self.budget)
             off = pilot.error(trial)
             runs.append((trial, off))
             keeping = keeping + 1 if SAFETY * off[-1] + pilot.floor[-1] <= error else 0
             # One that keeps it might be lucky.
             if keeping == 2 or trial.computed >= self.budget or (keeping == 0 and steps > _MOST_STEPS / 4):
                 break
-        return self._measured(*runs[-2], error) if keeping == 2 else self._extrapolated(runs, error)
+        if keeping < 2:
+            return self._extrapolated(runs, error)
+        trial, off = runs[-2]
+        evidence = (
+            f"this very run was made, flights taken at once, and compared with {pilot.best.scheme}; so was one of "
+            "half the step"
+        )
+        return self._option(trial, trial.steps, max(float(off[-1]), float(pilot.floor[-1])), MEASURED, error, evidence)
 
-    @property
-    def _limit(self) -> float:
-        return linear_stability.stability_limit(self.scheme, self.hardest.zeta)
-
-    def _ladder(self) -> Iterator[int]:
+    def _ladder(self, scheme: str) -> Iterator[int]:
         """Yield steps, twice as many every time, from where the scheme is stable on."""
-        longest = min(1.0, 0.9 * self._limit) if self._limit > 0.1 else 1.0
+        limit = linear_stability.stability_limit(scheme, self.hardest.zeta)
+        longest = min(1.0, 0.9 * limit) if limit > 0.1 else 1.0
         steps = SAMPLES * max(1, math.ceil(self.hardest.omega * self.pilot.scene.duration / longest / SAMPLES))
         while steps <= _MOST_STEPS:
             yield steps
             steps *= 2
 
-    def _measured(self, trial: Trial, off: Array, asked: float) -> Option:
-        error = max(float(off[-1]), float(self.pilot.floor[-1]))
-        evidence = (
-            f"this very run was made, flights taken at once, and compared with {self.pilot.best.scheme}; so was one of "
-            "half the step"
-        )
-        return self._option(trial.steps, error, MEASURED, trial, asked, evidence)
-
     def _extrapolated(self, runs: list[tuple[Trial, Array]], asked: float) -> Option:
         known, last = self._known(runs), runs[-1][0]
         if not known:
             evidence = "no run within the budget says how far off it is; more steps than these, by its stability limit"
-            return self._option(last.steps, None, THEORY, last, asked, evidence)
-        order = self._order([end for _, end in known])
+            return self._option(last, last.steps, None, THEORY, asked, evidence)
+        order = self._order(last.scheme, [end for _, end in known])
         worst = max(end * float(trial.steps) ** order for trial, end in known)
         wanted = (_FAR_SAFETY * worst / asked) ** (1 / order)
         evidence = (
@@ -107,19 +102,14 @@ class Search(NamedTuple):
         )
         if wanted >= _MOST_STEPS:
             evidence += ": more than can be counted"
-            return self._option(wanted, asked / _FAR_SAFETY, EXTRAPOLATED, last, asked, evidence)
+            return self._option(last, wanted, asked / _FAR_SAFETY, EXTRAPOLATED, asked, evidence)
         steps = SAMPLES * math.ceil(max(wanted, last.steps) / SAMPLES)
-        return self._option(steps, worst / float(steps) ** order, EXTRAPOLATED, last, asked, evidence)
+        return self._option(last, steps, worst / float(steps) ** order, EXTRAPOLATED, asked, evidence)
 
-    def _rounding(self, steps: int) -> float:
-        """Return what round-off may come to [radii]: half a unit of the place in each step, all in one direction."""
-        pilot = self.pilot
-        return steps * 2.0**-53 * float(np.nanmax(np.abs(pilot.best.places))) / pilot.scene.cube.radius
-
-    def _order(self, errors: list[float]) -> int:
+    def _order(self, scheme: str, errors: list[float]) -> int:
         """Return the order to extrapolate by: two only for a scheme of second order, where the last runs show it."""
         ground = self.pilot.scene.ground
-        if self.scheme not in _SECOND_ORDER or ground.damping > 0 or ground.friction > 0:
+        if scheme not in _SECOND_ORDER or ground.damping > 0 or ground.friction > 0:
             return 1
         shown = all(a / b > _SECOND for a, b in itertools.pairwise(errors) if b > 0)
         return 2 if len(errors) == _RUNGS and shown else 1
@@ -152,34 +142,33 @@ class Search(NamedTuple):
         return (last, grown) if math.isfinite(grown) else None
 
     def _option(
-        self, steps: float, error: float | None, basis: str, trial: Trial, asked: float, evidence: str
+        self, trial: Trial, steps: float, error: float | None, basis: str, asked: float, evidence: str
     ) -> Option:
-        """Return an option; error [radii]: expected. trial: what tells how long a step takes."""
-        scene, counted = self.pilot.scene, steps < _MOST_STEPS
-        keeps = counted and error is not None and self._rounding(int(steps)) <= asked
-        if counted and error is not None and not keeps:
-            evidence += f"; round-off of so many steps may come to {self._rounding(int(steps)):.1g} radii"
+        """Return an option of a trial's scheme, which tells how long a step takes; error [radii]: expected."""
+        pilot, counted = self.pilot, steps < _MOST_STEPS
+        # Half a unit of the place in each step, all in one direction.
+        rounding = steps * 2.0**-53 * float(np.nanmax(np.abs(pilot.best.places))) / pilot.scene.cube.radius
+        if counted and error is not None and rounding > asked:
+            evidence += f"; round-off of so many steps may come to {rounding:.1g} radii"
         return Option(
-            self.scheme,
-            int(steps) if counted else validation.LARGEST_COUNT,
-            None,
-            error,
-            basis,
-            trial.evaluations / max(1, trial.computed) * steps,
-            steps * self._seconds_per_step(trial.steps),
-            self.hardest.omega * scene.duration / steps,
-            self._limit,
-            keeps,
-            evidence,
+            scheme=trial.scheme,
+            steps=int(steps) if counted else validation.LARGEST_COUNT,
+            tolerance=None,
+            error=error,
+            basis=basis,
+            evaluations=trial.evaluations / max(1, trial.computed) * steps,
+            seconds=steps * self._seconds_per_step(trial),
+            omega_h=self.hardest.omega * pilot.scene.duration / steps,
+            limit=linear_stability.stability_limit(trial.scheme, self.hardest.zeta),
+            keeps=counted and error is not None and max(rounding, float(pilot.floor[-1])) <= asked,
+            evidence=evidence,
         )
 
-    def _seconds_per_step(self, steps: int) -> float:
+    def _seconds_per_step(self, trial: Trial) -> float:
         """Return how long a step takes [s], of plain stepping: the median of three runs."""
-        pilot, took = self.pilot, []
+        scene, model, steps, took = self.pilot.scene, self.pilot.model, trial.steps, []
         for _ in range(3):
             begun = time.perf_counter()
-            run = simulate(
-                pilot.scene, model=pilot.model, scheme=self.scheme, steps=steps, every=steps // SAMPLES, budget=_TIMED
-            )
+            run = simulate(scene, model=model, scheme=trial.scheme, steps=steps, every=steps // SAMPLES, budget=_TIMED)
             took.append((time.perf_counter() - begun) / max(1, int(run.steps_computed[0])))
         return statistics.median(took)

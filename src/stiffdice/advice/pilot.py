@@ -100,11 +100,6 @@ class Pilot:
     landings: npt.NDArray[np.int64]
 
     @property
-    def times(self) -> Array:
-        """The times of the samples [s]."""
-        return np.arange(SAMPLES + 1) / SAMPLES * self.scene.duration
-
-    @property
     def borne_out(self) -> str:
         """What bears the path out, and to how many radii."""
         twins, known = "twin runs (other intervals and tolerances)", f"bear out to {self.floor[-1]:.1g} radii"

@@ -7,6 +7,7 @@ made: its error is measured. Schemes of fixed steps are in `fixed_steps.py`.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import statistics
 from collections.abc import Callable, Iterator, Sequence
@@ -77,43 +78,39 @@ def advise(
     tell = tell or (lambda text: None)
     tell("a pilot run")
     pilot, cut = _known(dataclasses.replace(scene, duration=until), error, patience)
-    hardest = linear_stability.hardest(pilot.scene, pilot.model)
     if scheme is not None:
         schemes.check_fit(scheme, pilot.scene, pilot.model)
     tell("event")
     ladder = [] if scheme == "exact" else _ladder(pilot, patience)
-    shape = _shape(pilot, ladder)
-
-    def option_of(name: str) -> Option:
-        tell(name)
-        if name == "exact":
-            return _exact(pilot)
-        if name == "event":
-            return _event(pilot, ladder, error, patience)
-        return Search(pilot, name, hardest, shape, budget).option(error)
-
-    fit = [name for name in schemes.SCHEMES if not schemes.unfit(name, pilot.scene, pilot.model)]
-    options = [option_of(name) for name in (fit if scheme is None else [scheme])]
-    if not pilot.floor[-1] <= error:
-        options = [dataclasses.replace(option, keeps=False) for option in options]
+    search = Search(pilot, linear_stability.hardest(pilot.scene, pilot.model), _shape(pilot, ladder), budget)
+    options = []
+    for name in schemes.SCHEMES if scheme is None else [scheme]:
+        if not schemes.unfit(name, pilot.scene, pilot.model):
+            tell(name)
+            if name == "exact":
+                options.append(_exact(pilot, error))
+            elif name == "event":
+                options.append(_event(pilot, ladder, error, patience))
+            else:
+                options.append(search.option(name, error))
     options.sort(key=lambda option: (not option.keeps, option.seconds))
     best = _best(options)
     return Advice(
-        pilot.scene,
-        error,
-        scene.duration,
-        pilot.scene.duration,
-        cut,
-        pilot.model,
-        pilot.model_reason,
-        best,
-        tuple(options),
-        float(pilot.floor[-1]),
-        (pilot.best,) if pilot.other is None else (pilot.best, pilot.other),
-        len(pilot.landings),
-        _growth(pilot, shape),
-        hardest.mode,
-        tuple(_outside(pilot, best)),
+        scene=pilot.scene,
+        asked=error,
+        duration=scene.duration,
+        horizon=pilot.scene.duration,
+        cut=cut,
+        model=pilot.model,
+        model_reason=pilot.model_reason,
+        best=best,
+        options=tuple(options),
+        floor=float(pilot.floor[-1]),
+        paths=(pilot.best,) if pilot.other is None else (pilot.best, pilot.other),
+        landings=len(pilot.landings),
+        growth=_growth(pilot, search.shape),
+        mode=search.hardest.mode,
+        outside=tuple(_outside(pilot, best)),
     )
 
 
@@ -128,15 +125,14 @@ def _known(scene: Scene, error: float, patience: int) -> tuple[Pilot, str]:
             shorter = _rounded_down(0.8 * out.fraction * scene.duration)
             cut = cut or f"a pilot run to t = {scene.duration:g} s takes more than {patience:,} force evaluations"
         else:
-            known = np.flatnonzero(pilot.floor <= error)
-            last = int(known[-1]) if known.size else 0
+            last = int(np.flatnonzero(pilot.floor <= error).max(initial=0))
             if last == SAMPLES:
                 return pilot, cut
             if last == 0:
                 if not np.isfinite(pilot.floor[1]):
                     raise InputError("the motion leaves the range of doubles from the first steps on: no path to keep")
                 return pilot, f"{_judges(pilot, error, 1)} the path to {pilot.floor[1]:.1g} radii only"
-            shorter = _rounded_down(float(pilot.times[last]))
+            shorter = _rounded_down(last / SAMPLES * scene.duration)
             cut = cut or _why_unknown(pilot, error)
         if not 0 < shorter < scene.duration:
             raise InputError(
@@ -205,48 +201,52 @@ def _shape(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]]) -> Array:
     return max(small, key=lambda off: off[-1]) if small else pilot.floor
 
 
-def _exact(pilot: Pilot) -> Option:
+def _exact(pilot: Pilot, error: float) -> Option:
     evidence = f"it is exact but for round-off, which {pilot.borne_out}"
-    return _own_steps(pilot, pilot.best, None, float(pilot.floor[-1]), evidence)
+    return _made_again(pilot, pilot.best, None, float(pilot.floor[-1]), error, evidence)
 
 
 def _event(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]], error: float, patience: int) -> Option:
     """Return the cheapest tolerance from which on all finer ones keep an error."""
     if not ladder:
+        trial = tried(pilot.scene, pilot.model, "event", SAMPLES, schemes.FINEST, budget=patience)
         evidence = (
             f"a run takes more than {patience:,} force evaluations, a contact that lasts; none was made to the end"
         )
-        trial = tried(pilot.scene, pilot.model, "event", SAMPLES, schemes.FINEST, budget=patience)
-        most, seconds = trial.evaluations, trial.seconds
-        return Option("event", SAMPLES, schemes.FINEST, None, THEORY, most, seconds, None, None, False, evidence)
-    fit = [ladder[0]]
-    for trial, off in ladder[1:]:
-        if not SAFETY * off[-1] + pilot.floor[-1] <= error:
-            break
-        fit.append((trial, off))
-    trial, off = min(fit, key=lambda each: each[0].evaluations)
+        return _made_again(pilot, trial, schemes.FINEST, None, error, evidence)
+    fit = itertools.takewhile(lambda each: SAFETY * each[1][-1] + pilot.floor[-1] <= error, ladder[1:])
+    trial, off = min([ladder[0], *fit], key=lambda each: each[0].evaluations)
     # Where the path comes from these runs, the finest is as far off as that may be.
     expected = max(float(off[-1]), float(pilot.floor[-1]))
     by = "exact" if pilot.best.scheme == "exact" else f"event at tolerance {schemes.FINEST:.0e}"
     evidence = f"this very run was made, and compared with {by}, which {pilot.borne_out}"
-    option = _own_steps(pilot, trial, trial.tolerance, expected, evidence)
-    return dataclasses.replace(option, keeps=expected <= error)
+    return _made_again(pilot, trial, trial.tolerance, expected, error, evidence)
 
 
-def _own_steps(pilot: Pilot, trial: Trial, tolerance: float | None, error: float, evidence: str) -> Option:
-    """Return the option to make a run again that was made, by a scheme that takes its own steps."""
-    seconds = _seconds(pilot, trial)
+def _made_again(
+    pilot: Pilot, trial: Trial, tolerance: float | None, expected: float | None, error: float, evidence: str
+) -> Option:
+    """Return the option to make a trial again, of a scheme that takes its own steps; expected: its error, if known.
+
+    The time is the median of three more, unless that is slow.
+    """
+    seconds = trial.seconds
+    if seconds < _SLOW and trial.fraction == 1:
+        again = [tried(pilot.scene, pilot.model, trial.scheme, trial.steps, trial.tolerance) for _ in range(3)]
+        seconds = statistics.median(each.seconds for each in again)
     return Option(
-        trial.scheme, SAMPLES, tolerance, error, MEASURED, trial.evaluations, seconds, None, None, True, evidence
+        scheme=trial.scheme,
+        steps=SAMPLES,
+        tolerance=tolerance,
+        error=expected,
+        basis=THEORY if expected is None else MEASURED,
+        evaluations=trial.evaluations,
+        seconds=seconds,
+        omega_h=None,
+        limit=None,
+        keeps=expected is not None and expected <= error,
+        evidence=evidence,
     )
-
-
-def _seconds(pilot: Pilot, trial: Trial) -> float:
-    """Return how long a run takes [s]: the median of three more, unless it is slow."""
-    if trial.seconds >= _SLOW:
-        return trial.seconds
-    again = [tried(pilot.scene, pilot.model, trial.scheme, trial.steps, trial.tolerance) for _ in range(3)]
-    return statistics.median(each.seconds for each in again)
 
 
 def _growth(pilot: Pilot, shape: Array) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 
 _NEEDED = ("title", "version", "date-released", "license", "authors")
+_NAMES = ("name", "given-names", "name-particle", "family-names", "name-suffix")
 
 
 class Author(NamedTuple):
@@ -49,25 +50,27 @@ class Citation(NamedTuple):
             url=data.get("repository-code", data.get("url")),
             abstract=" ".join(str(data.get("abstract", "")).split()),
             keywords=tuple(data.get("keywords", ())),
-            authors=tuple(map(_author, data["authors"])),
-            references=tuple((work["title"], _names(work)) for work in data.get("references", ())),
+            authors=_authors(data),
+            references=tuple((work["title"], _named(_authors(work))) for work in data.get("references", ())),
         )
 
     @property
     def sentence(self) -> str:
         """How to cite it, in one line."""
-        authors = ", ".join(author.name for author in self.authors)
-        return f"{authors} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
+        return f"{_named(self.authors)} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
 
 
-def _names(work: Mapping[str, Any]) -> str:
-    return ", ".join(_author(entry).name for entry in work["authors"])
+def _named(authors: Iterable[Author]) -> str:
+    return ", ".join(author.name for author in authors)
 
 
-def _author(entry: Mapping[str, Any]) -> Author:
-    if "name" in entry:
-        return Author(entry["name"], False, entry.get("website"), None)
-    parts = (entry.get(key) for key in ("given-names", "name-particle", "family-names", "name-suffix"))
-    return Author(
-        " ".join(filter(None, parts)), True, entry.get("orcid", entry.get("website")), entry.get("affiliation")
+def _authors(work: Mapping[str, Any]) -> tuple[Author, ...]:
+    return tuple(
+        Author(
+            " ".join(entry[key] for key in _NAMES if key in entry),
+            "name" not in entry,
+            entry.get("orcid", entry.get("website")),
+            entry.get("affiliation"),
+        )
+        for entry in work["authors"]
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from stiffdice import __version__
 from stiffdice.archive import extract, manifest
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
@@ -14,30 +15,17 @@ from stiffdice.io.reader import open_file
 from stiffdice.study import outputs, provenance
 from stiffdice.study.config import Study
 
-# By their names; the order is that of every list of sizes.
-KINDS = {
-    "data": "data",
-    "figures": "figures and tables",
-    "report": "report",
-    "logs": "logs and benchmarks",
-    "config": "studies and scenes",
-    "code": "code and workflow",
-    "lock": "locked versions",
-    "about": "text for people",
-}
+# In the order of every list of sizes.
+DATA, SHOWN, REPORT, LOGS = "data", "figures and tables", "report", "logs and benchmarks"
+CONFIG, CODE, LOCK, TEXT = "studies and scenes", "code and workflow", "locked versions", "text for people"
+KINDS = (DATA, SHOWN, REPORT, LOGS, CONFIG, CODE, LOCK, TEXT)
+# Of results by their stage; all others are data.
+_KINDS = {"figure": SHOWN, "animation": SHOWN, "table": SHOWN, "timings": LOGS}
 
 # Of the project, whole.
-_FILES = {
-    "CHANGELOG.md": "about",
-    "CITATION.cff": "about",
-    "LICENSE": "about",
-    "Makefile": "code",
-    "README.md": "about",
-    "Snakefile": "code",
-    "pyproject.toml": "code",
-    "results/README.md": "about",
-}
-_TREES = {"requirements": "lock", "src": "code", "workflow": "code"}
+_FILES = dict.fromkeys(("CHANGELOG.md", "CITATION.cff", "LICENSE", "README.md", "results/README.md"), TEXT)
+_FILES |= dict.fromkeys(("Makefile", "Snakefile", "pyproject.toml"), CODE)
+_TREES = {"requirements": LOCK, "src": CODE, "workflow": CODE}
 
 # What a job in progress, an interrupted one, a damaged result or Python leaves behind, and archives themselves.
 _LEFT_OUT = (".part", ".damaged", ".pyc", ".zip", ".egg-info")
@@ -50,13 +38,6 @@ class File(NamedTuple):
     kind: str
     source: Path
     result: outputs.Result | None = None
-
-
-class Found(NamedTuple):
-    """What the data say: of each shard how many runs it holds, and every library or engine with its version."""
-
-    runs: Mapping[str, int]
-    software: tuple[tuple[str, str], ...]
 
 
 def of(study: Study, root: Path) -> list[File]:
@@ -86,29 +67,25 @@ def scenes_of(study: str, root: Path) -> list[str]:
     return list(found)
 
 
-def read(files: list[File]) -> Found:
-    """Read every HDF5 file and return what the data say; raises RefusedError naming the first that is not whole."""
+def read(files: list[File]) -> tuple[dict[str, int], list[tuple[str, str]]]:
+    """Read every HDF5 file; return how many runs each shard holds, and name and version of all that made the data.
+
+    Raises RefusedError naming the first file that is not whole.
+    """
     runs: dict[str, int] = {}
-    software: set[tuple[str, str]] = set()
+    software = {("stiffdice", __version__)}
     for file in files:
         if file.result is None or file.source.suffix != ".h5":
             continue
         dataset = open_file(file.source)
         if file.result.stage == "shard":
             runs[file.path] = dataset.sizes["cell"] * dataset.sizes["member"]
-        software.update(_software(dataset.attrs))
-    return Found(runs, tuple(sorted(software)))
-
-
-def _software(attributes: Mapping[Any, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what a file says of who made it, with versions: this program, libraries, other engines."""
-    for key in ("libraries", "engine_versions", "simulator_version"):
-        for entry in str(attributes.get(key, "")).split("; "):
-            name, _, version = entry.partition(" ")
-            if version:
-                yield name, version
-    if "stiffdice_version" in attributes:
-        yield "stiffdice", str(attributes["stiffdice_version"])
+        for key in ("libraries", "engine_versions", "simulator_version"):
+            for entry in str(dataset.attrs.get(key, "")).split("; "):
+                name, _, version = entry.partition(" ")
+                if version:
+                    software.add((name, version))
+    return runs, sorted(software)
 
 
 def _project(root: Path) -> Iterator[File]:
@@ -118,7 +95,7 @@ def _project(root: Path) -> Iterator[File]:
         yield File(path, kind, root / path)
     for top, kind in _TREES.items():
         yield from tree(root, top, kind)
-    for file in tree(root, "docs", "about"):
+    for file in tree(root, "docs", TEXT):
         if file.path.endswith(".md"):
             yield file
 
@@ -127,8 +104,8 @@ def _config(study: str, root: Path) -> Iterator[File]:
     for path in scenes_of(study, root):
         if (root / path).is_symlink():
             raise InputError(f"{path}: a link; an archive holds files only")
-        yield File(path, "config", root / path)
-    for file in tree(root, "config", "config"):
+        yield File(path, CONFIG, root / path)
+    for file in tree(root, "config", CONFIG):
         # Somebody's own; Git leaves them out, too.
         if not file.path.startswith("config/my-") or file.path == f"config/{study}.yaml":
             yield file
@@ -166,17 +143,11 @@ def _results(study: Study, root: Path) -> Iterator[File]:
             f"{top}/{first.files[0]}: {reason}, as {len(stale)} of {len(outputs.of(study))} results of this study; "
             f"make study STUDY={study.name} makes them again"
         )
-    for path, result in planned:
-        yield File(path, _kind(path, result), root / path, result)
     for result in outputs.of(study):
-        for side in (f"{top}/{result.log}", f"{top}/{result.benchmark}"):
-            if (root / side).is_file():
-                yield File(side, "logs", root / side)
+        for path in result.files:
+            yield File(f"{top}/{path}", _KINDS.get(result.stage, DATA), root / top / path, result)
+        for side in (result.log, result.benchmark):
+            if (root / top / side).is_file():
+                yield File(f"{top}/{side}", LOGS, root / top / side)
     if (root / top / "report.html").is_file():
-        yield File(f"{top}/report.html", "report", root / top / "report.html")
-
-
-def _kind(path: str, result: outputs.Result) -> str:
-    if result.stage in {"figure", "animation", "table"}:
-        return "figures"
-    return "logs" if result.stage == "timings" else "data"
+        yield File(f"{top}/report.html", REPORT, root / top / "report.html")

@@ -15,10 +15,9 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from stiffdice import __version__
 from stiffdice.archive import manifest
 from stiffdice.archive.citation import Author, Citation
-from stiffdice.archive.contents import KINDS, File
+from stiffdice.archive.contents import LOGS, REPORT, File
 from stiffdice.archive.sizes import Sizes
 from stiffdice.errors import RefusedError
 from stiffdice.study.config import Study
@@ -27,18 +26,13 @@ from stiffdice.study.outputs import Result
 
 NAME = "ro-crate-metadata.json"
 
-# What the crate conforms to, what its workflow does, and what each of its parameters does: names and versions.
+# What the crate conforms to: names and versions; and what its workflow does.
 _PROFILES = {
     "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
     "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
     "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
 }
 _WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
-_PARAMETER_PROFILE = "https://bioschemas.org/profiles/FormalParameter/1.0-RELEASE"
-_OF_PARTS = {
-    _WORKFLOW_PROFILE: ("Bioschemas ComputationalWorkflow", "1.0-RELEASE"),
-    _PARAMETER_PROFILE: ("Bioschemas FormalParameter", "1.0-RELEASE"),
-}
 # Schema.org has had this property since its version 12, RO-Crate 1.1 goes by version 10.
 _TERMS = {"sha256": "http://schema.org/sha256"}
 _NETCDF = "https://docs.unidata.ucar.edu/netcdf-c/current/file_format_specifications.html"
@@ -50,28 +44,9 @@ _FORMATS = {
     ".toml": "application/toml",
     ".yaml": "application/yaml",
 }
-_FOLDERS = {
-    "config": "The studies, and the scenes that they name",
-    "docs": "How things are measured, what was found, and what is in the files",
-    "requirements": "Every package in its version, with digests: what .venv is made from",
-    "src/stiffdice": "The library: the simulator, its judgement, its figures",
-    "workflow": "Rules, scripts and schema of the workflow",
-}
 # Files of the project that are described one by one, besides the study's and README.md, which is about the whole.
 _FILES = ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md")
-_HOMEPAGES = {
-    "drake": "https://drake.mit.edu",
-    "h5netcdf": "https://h5netcdf.org",
-    "h5py": "https://www.h5py.org",
-    "llvmlite": "https://llvmlite.readthedocs.io",
-    "mujoco": "https://mujoco.org",
-    "numba": "https://numba.pydata.org",
-    "numpy": "https://numpy.org",
-    "octave": "https://octave.org",
-    "pybullet": "https://pybullet.org",
-    "scipy": "https://scipy.org",
-    "xarray": "https://xarray.dev",
-}
+_HOMEPAGES = {"octave": "https://octave.org"}  # of what is not on PyPI
 
 
 class Facts(NamedTuple):
@@ -111,7 +86,7 @@ def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
     """
     begun, ended = [], []
     for file in files:
-        if file.kind != "logs" or file.source.suffix != ".tsv":
+        if file.kind != LOGS or file.source.suffix != ".tsv":
             continue
         end = file.source.stat().st_mtime
         seconds = took(file.source)
@@ -125,25 +100,10 @@ def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
     return first, last
 
 
-def describe(result: Result, suffix: str, study: Study) -> str:
-    """Return in one line what a file of a result is."""
-    if result.stage == "shard":
-        return f"Every run of some cells of the sweep {result.name.split('/')[0]}"
-    if result.stage == "survey":
-        sweep, _, number = result.name.partition("/")
-        return f"Cells of the sweep {sweep} up to round {number}, judged: where the next round's lie"
-    if result.stage == "collect":
-        return f"{'Which shard holds what' if suffix == '.csv' else 'All cells, judged'}, of the sweep {result.name}"
-    if result.stage in {"figure", "animation"}:
-        return study.figures[result.name].title
-    if result.stage == "table":
-        return study.tables[result.name].title
-    return {
-        "trajectory": f"The trajectory of the run {result.name}",
-        "experiment": f"What the experiment {result.name} measured",
-        "timings": f"Wall times of {result.name}, with the machine they were taken on: differ between two rebuilds",
-        "frontier": f"The edges of stability of the sweep {result.name}",
-    }[result.stage]
+def describe(result: Result, study: Study) -> str:
+    """Return in one line what a result is: the title of a figure or table, the stage and name of any other."""
+    shown = {"figure": study.figures, "animation": study.figures, "table": study.tables}.get(result.stage, {})
+    return shown[result.name].title if result.name in shown else f"{result.stage} {result.name}"
 
 
 def metadata(facts: Facts) -> str:
@@ -181,8 +141,6 @@ class _Crate:
         for path in _FILES:
             self._file(path)
         self._file("README.md", about=root)
-        for path, description in _FOLDERS.items():
-            self._folder(path, description)
         self._add(_NETCDF, "WebSite", name="netCDF-4 on HDF5")
         told = {"name": manifest.NAME, "encodingFormat": "text/plain"}
         told["description"] = "The SHA-256 of every file but itself: sha256sum --check"
@@ -211,12 +169,6 @@ class _Crate:
         told: dict[str, Any] = {"name": PurePosixPath(path).name, "contentSize": str(size), "sha256": sha256}
         return told | {"encodingFormat": [media, {"@id": _NETCDF}] if suffix == ".h5" else media}
 
-    def _profiles(self, profiles: Mapping[str, tuple[str, str]]) -> list[Any]:
-        return [
-            self._add(identifier, "CreativeWork", name=name, version=number)
-            for identifier, (name, number) in profiles.items()
-        ]
-
     def _describe(self, root: Any, run: Any) -> None:
         facts, cited = self.facts, self.facts.citation
         licence = f"https://spdx.org/licenses/{cited.licence}"
@@ -225,29 +177,26 @@ class _Crate:
             "workflow, code and locked versions. 'stiffdice verify' checks it, 'stiffdice rebuild' makes it again. "
             f"{facts.sizes.sentence}"
         ).strip()
-        told = {
+        told = f"{cited.licence} licence; its text is in the file LICENSE."
+        properties = {
             "name": facts.title,
             "description": " ".join([about, *(f"{line}." for line in facts.study.left_out)]),
             "datePublished": facts.published,
             "version": cited.version,
             "keywords": ", ".join(cited.keywords),
-            "license": self._add(
-                licence,
-                "CreativeWork",
-                name=cited.licence,
-                description=f"{cited.licence} licence; its text is in the file LICENSE.",
-                url=licence,
-            ),
+            "license": self._add(licence, "CreativeWork", name=cited.licence, description=told, url=licence),
             "author": [self._author(k, author) for k, author in enumerate(cited.authors, 1)],
             "citation": [
                 self._add(f"#reference-{k}", "CreativeWork", name=title, description=f"By {authors}")
                 for k, (title, authors) in enumerate(cited.references, 1)
             ],
-            "conformsTo": self._profiles(_PROFILES),
+            "conformsTo": [
+                self._add(identifier, "CreativeWork", name=name, version=number)
+                for identifier, (name, number) in _PROFILES.items()
+            ],
             "mentions": [run],
-            "size": self._sizes(),
         }
-        for key, value in told.items():
+        for key, value in properties.items():
             if value:
                 root[key] = value
 
@@ -257,61 +206,37 @@ class _Crate:
         identifier = author.url or f"#author-{number}"
         return self._add(identifier, kind, name=author.name, url=author.url, affiliation=employer)
 
-    def _sizes(self) -> list[Any]:
-        sizes = self.facts.sizes
-        amounts: list[tuple[str, str, float, str]] = [
-            (kind, KINDS[kind], size.bytes, "bytes") for kind, size in sizes.kinds.items()
-        ]
-        amounts += [("runs", "runs in shards", sizes.runs, "runs")]
-        if sizes.per_run:
-            amounts += [("run", "a run in the shards", round(sizes.per_run[0], 1), "bytes per run")]
-        return [
-            self._add(f"#size-{key}", "QuantitativeValue", name=name, value=value, unitText=unit)
-            for key, name, value, unit in amounts
-        ]
-
     def _workflow(self) -> Any:
-        study, where = self.facts.study.name, self.facts.citation.url or {"@id": "README.md"}
-        value = self._add("#study-given", "PropertyValue", name="study", value=study)
-        given = self._parameter("study", "Text", "Which study in config/ is run", value)
-        made = self._parameter("results", "Dataset", "Everything that the study asks for", {"@id": f"results/{study}/"})
-        value["exampleOfWork"] = given
         try:
             number = version("snakemake")
         except PackageNotFoundError:
             number = None
-        workflow = self.crate.add_workflow(
-            dest_path="Snakefile", main=True, lang="snakemake", lang_version=number, properties=self._said("Snakefile")
-        )
         told = {
             "name": "stiffdice: how many time steps a stiff ground costs",
             "description": "From a study to runs, shards, sweeps, frontiers, figures and tables.",
             "version": self.facts.citation.version,
-            "url": where,
+            "url": self.facts.citation.url or {"@id": "README.md"},
             "encodingFormat": "text/plain",
-            "conformsTo": {"@id": _WORKFLOW_PROFILE},
-            "input": [given],
-            "output": [made],
+            "conformsTo": self._add(_WORKFLOW_PROFILE, "CreativeWork", name="Bioschemas ComputationalWorkflow"),
             "softwareRequirements": self._software(),
         }
-        for key, about in told.items():
-            workflow[key] = about
-        self._profiles(_OF_PARTS)
-        return workflow
-
-    def _parameter(self, name: str, kind: str, description: str, example: Any) -> Any:
-        told = {"additionalType": kind, "description": description, "workExample": example}
-        return self._add(f"#{name}", "FormalParameter", name=name, conformsTo={"@id": _PARAMETER_PROFILE}, **told)
+        return self.crate.add_workflow(
+            dest_path="Snakefile",
+            main=True,
+            lang="snakemake",
+            lang_version=number,
+            properties=self._said("Snakefile") | told,
+        )
 
     def _software(self) -> list[Any]:
         """Add whatever made the numbers, in the versions that the files of results give."""
         entities = []
-        for name, number in sorted({("stiffdice", __version__), *self.facts.software}):
-            ours = name == "stiffdice"
-            home = self.facts.citation.url if ours else _HOMEPAGES.get(name)
-            identifier = f"{home}#{quote(number)}" if home else f"#{quote(name)}-{quote(number)}"
-            url = home or ({"@id": "README.md"} if ours else None)
-            entities.append(self._add(identifier, "SoftwareApplication", name=name, softwareVersion=number, url=url))
+        for name, number in self.facts.software:
+            home, url = _HOMEPAGES.get(name, f"https://pypi.org/project/{name}/"), None
+            if name == "stiffdice":
+                home, url = self.facts.citation.url or "", {"@id": "README.md"}
+            told = {"name": name, "softwareVersion": number, "url": home or url}
+            entities.append(self._add(f"{home}#{quote(f'{name}-{number}')}", "SoftwareApplication", **told))
         return entities
 
     def _results(self) -> list[Any]:
@@ -321,17 +246,15 @@ class _Crate:
         made, sides = [], []
         for file in facts.files:
             if file.result is not None:
-                told = describe(file.result, PurePosixPath(file.path).suffix, facts.study)
-                made.append(self._file(file.path, description=told))
-            elif file.kind == "report":
+                made.append(self._file(file.path, description=describe(file.result, facts.study)))
+            elif file.kind == REPORT:
                 told = "Snakemake's report: every figure with its caption, code and configuration, and when jobs ran"
                 sides.append(self._file(file.path, description=told, about={"@id": "#run"}))
         differ = "differs between two rebuilds"
         for name, told in (("logs", f"What every job said; {differ}"), ("benchmarks", f"How long it took; {differ}")):
             if any(file.path.startswith(f"{top}/{name}/") for file in facts.files):
                 sides.append(self._folder(f"{top}/{name}", told, about={"@id": "#run"}))
-        parts, asked = [*made, *sides], {"@id": "#results"}
-        return [self._folder(top, "All results of the study", exampleOfWork=asked, hasPart=parts), *made]
+        return [self._folder(top, "All results of the study", hasPart=[*made, *sides]), *made]
 
     def _run(self, workflow: Any, inputs: list[Any], outputs: list[Any]) -> Any:
         facts = self.facts
@@ -343,7 +266,7 @@ class _Crate:
             description=f"snakemake study --config study={facts.study.name}",
             actionStatus="http://schema.org/CompletedActionStatus",
             instrument=workflow,
-            object=[{"@id": "#study-given"}, *inputs],
+            object=inputs,
             result=outputs,
             startTime=begun,
             endTime=ended,

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import os
+import re
 import shutil
 import stat
 import struct
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
@@ -32,18 +33,12 @@ MOST_FOLDERS = 10_000  # also those that are only in names; ours have some dozen
 MOST_PARTS = 20  # of a name; ours have up to 6
 
 
-def unzip(
-    path: str | Path,
-    folder: str | Path,
-    tell: Callable[[float], None] = lambda done: None,
-    *,
-    damaged: dict[str, str] | None = None,
-) -> None:
-    """Unpack a zip file that nobody vouches for into a new or empty folder, all of it or nothing.
+def unzip(path: str | Path, folder: str | Path, damaged: dict[str, str] | None = None) -> None:
+    """Unpack a zip file that nobody vouches for into a new folder, all of it or nothing.
 
-    tell: called with the fraction done. damaged: members whose content is not what it was are left out and noted here,
-    with the reason; without it, the first of them ends it. Raises RefusedError naming the file, the member and what is
-    wrong with it, InputError if it cannot be read or the folder is not empty, OutputError if there is no room.
+    damaged: members whose content is not what it was are left out and noted here, with the reason; without it, the
+    first of them ends it. Raises RefusedError naming the file, the member and what is wrong with it, InputError if it
+    cannot be read, OutputError if the folder is there or has no room.
     """
     target = Path(folder)
     try:
@@ -52,33 +47,33 @@ def unzip(
         raise InputError(f"{path}: {error.strerror or error}") from None
     except _DAMAGED as error:
         raise RefusedError(f"{path}: not a zip file, or a damaged one ({error})") from None
-    with archive:
+    with archive, ExitStack() as unfinished:
         try:
             _check(archive.infolist())
         except RefusedError as error:
             raise error.within(str(path)) from None
-        _check_target(target, sum(member.file_size for member in archive.infolist()))
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
         try:
-            temporary.mkdir()
-            _unpack_all(archive, temporary, tell, damaged)
-            temporary.replace(target)
+            target.mkdir()
+            unfinished.callback(shutil.rmtree, target, ignore_errors=True)
+            size, free = sum(member.file_size for member in archive.infolist()), shutil.disk_usage(target).free
+            if size > free:
+                raise OutputError(f"{target}: needs {size} bytes of disk, {free} are free; nothing was unpacked")
+            _unpack_all(archive, target, damaged)
         except OSError as error:
             raise OutputError(f"{target}: {error.strerror}; nothing was unpacked") from None
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+        unfinished.pop_all()
 
 
 def _check(members: Sequence[ZipInfo]) -> None:
     """Raise RefusedError naming the first member that must not be unpacked, and why."""
     if len(members) > MOST_MEMBERS:
         raise RefusedError(f"{len(members)} members; allowed are {MOST_MEMBERS}")
+    check_names([member.orig_filename for member in members])
     for member in members:
         if reason := _wrong(member):
             raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
     if sum(member.file_size for member in members) > MOST_BYTES:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
-    check_names([member.filename for member in members])
     _check_overlaps(members)
 
 
@@ -94,7 +89,7 @@ def _wrong(member: ZipInfo) -> str | None:
         f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
         f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
     }
-    return _wrong_name(member.orig_filename) or next((reason for reason, holds in reasons.items() if holds), None)
+    return next((reason for reason, holds in reasons.items() if holds), None)
 
 
 def _is_folder(name: str) -> bool:
@@ -122,33 +117,24 @@ def check_names(names: Sequence[str]) -> None:
 
     That is in any case, in any form of Unicode, or as a file and a folder.
     """
-    folders: set[str] = set()
-    files: set[str] = set()
     spelt: dict[str, str] = {}  # each path of a file or folder, as a file system may know it and as it is said
+    folders: set[str] = set()
     for name in names:
         if reason := _wrong_name(name):
             raise RefusedError(f"{name[:200]}: {reason}")
-        *above, last = name.removesuffix("/").split("/")
-        path = ""
-        for part in [*above, last] if _is_folder(name) else above:
-            path += f"{part}/"
-            if path not in folders:
+        for path in (name[: found.end()] for found in re.finditer("/|[^/]$", name)):
+            if path in folders:
+                continue
+            folded = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", path.removesuffix("/")).casefold())
+            if folded in spelt:
+                twice = path == spelt[folded]
+                reason = "is there twice" if twice else f"a name that some systems take for {spelt[folded]}"
+                raise RefusedError(f"{path}: {reason}")
+            spelt[folded] = path
+            if _is_folder(path):
                 folders.add(path)
-                _take(path, spelt)
         if len(folders) > MOST_FOLDERS:
             raise RefusedError(f"more than {MOST_FOLDERS} folders; this is no archive of a study")
-        if not _is_folder(name):
-            if name in files:
-                raise RefusedError(f"{name}: is there twice")
-            files.add(name)
-            _take(name, spelt)
-
-
-def _take(path: str, spelt: dict[str, str]) -> None:
-    folded = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", path.removesuffix("/")).casefold())
-    other = spelt.setdefault(folded, path)
-    if other != path:
-        raise RefusedError(f"{path}: a name that some systems take for {other}")
 
 
 def _check_overlaps(members: Sequence[ZipInfo]) -> None:
@@ -163,22 +149,8 @@ def _check_overlaps(members: Sequence[ZipInfo]) -> None:
         end = member.header_offset + _HEADER + member.compress_size
 
 
-def _check_target(target: Path, size: int) -> None:
-    if not target.parent.is_dir():
-        raise OutputError(f"{target}: the folder {target.parent} does not exist")
-    if target.is_symlink() or (target.exists() and not target.is_dir()):
-        raise OutputError(f"{target}: is there and not a folder")
-    if target.is_dir() and any(target.iterdir()):
-        raise OutputError(f"{target}: is not empty; name a new folder")
-    free = shutil.disk_usage(target.parent).free
-    if size > free:
-        raise OutputError(f"{target}: needs {size} bytes of disk, {free} are free; nothing was unpacked")
-
-
-def _unpack_all(archive: ZipFile, folder: Path, tell: Callable[[float], None], damaged: dict[str, str] | None) -> None:
-    members = archive.infolist()
-    done, total = 0, 1 + sum(member.compress_size for member in members)
-    for member in members:
+def _unpack_all(archive: ZipFile, folder: Path, damaged: dict[str, str] | None) -> None:
+    for member in archive.infolist():
         try:
             _unpack(archive, member, folder / member.filename)
         except _DAMAGED as error:
@@ -186,8 +158,6 @@ def _unpack_all(archive: ZipFile, folder: Path, tell: Callable[[float], None], d
             if damaged is None:
                 raise RefusedError(f"{archive.filename}: {member.filename}: {reason}") from None
             damaged[member.filename] = reason
-        done += member.compress_size
-        tell(done / total)
 
 
 def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
@@ -205,5 +175,3 @@ def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
     except _DAMAGED:
         path.unlink(missing_ok=True)
         raise
-    if member.external_attr >> 16 & stat.S_IXUSR:
-        path.chmod(path.stat().st_mode | ((path.stat().st_mode & 0o444) >> 2))

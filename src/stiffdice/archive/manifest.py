@@ -51,13 +51,14 @@ def text_of(digests: Mapping[str, str]) -> str:
 def parse(text: str) -> dict[str, str]:
     """Return the digest of every file, by path; raises RefusedError naming the line that is none."""
     digests: dict[str, str] = {}
-    for number, line in enumerate(text.split("\n")[:-1], 1):
+    *lines, rest = text.split("\n")
+    for number, line in enumerate(lines, 1):
         found = _LINE.fullmatch(line)
         if found is None:
-            raise RefusedError(f"{NAME}: line {number}: allowed are a SHA-256, two spaces and a path")
+            raise RefusedError(f"line {number}: allowed are a SHA-256, two spaces and a path")
         if found[2] in digests:
-            raise RefusedError(f"{NAME}: line {number}: {found[2]} is listed twice")
+            raise RefusedError(f"line {number}: {found[2]} is listed twice")
         digests[found[2]] = found[1]
-    if not text.endswith("\n"):
-        raise RefusedError(f"{NAME}: does not end with a whole line; it is cut short")
+    if rest:
+        raise RefusedError("does not end with a whole line; it is cut short")
     return digests

@@ -47,7 +47,7 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
     path = check_target(target)
     files = contents.of(study, root)
     digests = {file.path: manifest.digest_of(file.source) for file in files}
-    found = contents.read(files)
+    runs, software = contents.read(files)
     with whole(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
         for folder in sorted(_folders(digests)):
             archive.writestr(_info(folder, stat.S_IFDIR | 0o755, ZIP_STORED), b"")
@@ -59,8 +59,8 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
             files,
             contents.scenes_of(study.name, root),
             {name: (archive.getinfo(name).file_size, digest) for name, digest in digests.items()},
-            _sizes(archive, files, found.runs),
-            found.software,
+            _sizes(archive, files, runs),
+            software,
             crate.span_of(files),
             agent,
         )
@@ -100,9 +100,7 @@ def _add(archive: ZipFile, file: contents.File, sha256: str) -> None:
 
 
 def _sizes(archive: ZipFile, files: Sequence[contents.File], runs: Mapping[str, int]) -> Sizes:
-    def size_of(paths: Iterable[str]) -> Size:
-        return Size.of(map(archive.getinfo, paths))
-
-    kinds = {kind: size_of(file.path for file in files if file.kind == kind) for kind in contents.KINDS}
-    there = {kind: size for kind, size in kinds.items() if size.files}
-    return Sizes(there, size_of(file.path for file in files), sum(runs.values()), size_of(runs))
+    members = {kind: [file.path for file in files if file.kind == kind] for kind in contents.KINDS}
+    members = {kind: paths for kind, paths in members.items() if paths} | {"all": [file.path for file in files]}
+    kinds = {kind: Size.of(map(archive.getinfo, paths)) for kind, paths in members.items()}
+    return Sizes(kinds, sum(runs.values()), Size.of(map(archive.getinfo, runs)))

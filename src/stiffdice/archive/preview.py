@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stiffdice.archive import manifest
+from stiffdice.archive.contents import REPORT
 from stiffdice.archive.sizes import in_megabytes
 from stiffdice.errors import printable
 
@@ -21,26 +21,19 @@ def page(facts: Facts) -> str:
     from jinja2 import Environment
 
     environment = Environment(autoescape=True, finalize=_shown, trim_blocks=True, keep_trailing_newline=True)
-    environment.filters |= {"megabytes": in_megabytes, "time": _time}
+    environment.filters["megabytes"] = in_megabytes
     template = environment.from_string(Path(__file__).with_name("preview.html.jinja").read_text(encoding="utf-8"))
-    return template.render(facts=facts, paths=_paths(facts), manifest=manifest.NAME)
+    # Worth opening; shards, logs and code are in the manifest.
+    shown = [
+        file.path
+        for file in facts.files
+        if file.kind == REPORT
+        or (file.result is not None and file.result.stage not in {"shard", "figure", "animation"})
+        or file.path == "docs/FORMAT.md"
+    ]
+    paths = ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME, *shown]
+    return template.render(facts=facts, paths=paths, manifest=manifest.NAME)
 
 
 def _shown(value: object) -> object:
     return printable(value) if isinstance(value, str) else value
-
-
-def _time(time: datetime) -> str:
-    return f"{time:%Y-%m-%d %H:%M:%S} UTC"
-
-
-def _paths(facts: Facts) -> list[str]:
-    """Return what is worth opening; shards, logs and code are in the manifest."""
-    paths = [
-        file.path
-        for file in facts.files
-        if file.kind == "report"
-        or (file.result is not None and file.result.stage not in {"shard", "figure", "animation"})
-        or (file.path.startswith("docs/") and file.path.lower().endswith("format.md"))
-    ]
-    return ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME, *paths]

@@ -10,10 +10,9 @@ import re
 import shutil
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
@@ -39,8 +38,6 @@ _NOTHING = "nothing"  # an empty folder, for results that are not in their place
 _READ = (".yaml", ".yml", ".json")
 
 _LOG_READ = 1 << 20  # bytes at the end of a log
-
-Tell = Callable[[str], None]
 
 
 class RunError(StiffdiceError):
@@ -69,19 +66,14 @@ class Opened(NamedTuple):
     code: Code
 
 
-@dataclass
-class Rebuilt:
+class Rebuilt(NamedTuple):
     """What came of it.
 
-    folder: where it lies, if it was kept. by: what code made it again. found: how the archive's results (A) and those
-    that were made (B) differ; logs, times, and what shows times are left out. notes: what may explain a difference, and
-    what equality does not say.
+    found: how the archive's results (A) and those that were made (B) differ; logs, times, and what shows times are left
+    out. notes: what may explain a difference, and what equality does not say.
     """
 
-    archive: str
-    study: str
-    by: str
-    folder: str | None
+    unpacked: Opened
     found: Comparison
     notes: list[str]
 
@@ -92,10 +84,12 @@ class Rebuilt:
 
     def lines(self) -> list[str]:
         """Return it for people: how much is the same, all that differs, and what may explain it."""
-        found = self.found
+        found, unpacked = self.found, self.unpacked
+        ours = unpacked.code.is_installed
+        by = f"the installed code, stiffdice {__version__}" if ours else "the archive's own code, not the installed"
         lines = [
-            f"{self.archive}: the study {self.study}, made again by {self.by}: {found.identical} files are the same to "
-            f"the last bit, {len(found.differences) + len(found.only_a)} differ; {len(found.left_out)} hold or show "
+            f"{unpacked.archive}: the study {unpacked.study}, made again by {by}: {found.identical} files are the same "
+            f"to the last bit, {len(found.differences) + len(found.only_a)} differ; {len(found.left_out)} hold or show "
             "times and are not compared"
         ]
         if not found.same:
@@ -103,28 +97,25 @@ class Rebuilt:
         elif found.identical < found.files:
             lines.append(found.verdict)
         lines += [f"note: {note}" for note in self.notes]
-        if self.folder is not None:
-            lines.append(f"it lies in {self.folder}: the archive in {ARCHIVED}, what was made again in {REBUILT}")
+        if unpacked.kept:
+            lines.append(f"it lies in {unpacked.folder}: the archive in {ARCHIVED}, what was made again in {REBUILT}")
         return [printable(line) for line in lines]
 
 
 @contextmanager
-def opened(archive: str | Path, folder: str | Path | None = None, tell: Tell = lambda text: None) -> Iterator[Opened]:
+def opened(archive: str | Path, folder: str | Path | None = None) -> Iterator[Opened]:
     """Unpack and check an archive, and compare its code with the installed; nothing of it is executed.
 
-    folder: where to unpack it and make it again, new or empty, and to leave it there; None takes a temporary one. tell:
-    called with what is done next. Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be
-    read; nothing is left then, but of a run that failed.
+    folder: a new one, where to unpack it, make it again and leave it; None takes a temporary one.
+    Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be read; nothing is left then,
+    but of a run that failed.
     """
     with _place(folder) as place:
-        tell("unpacking")
         unzip(archive, place / ARCHIVED)
-        tell("checking")
         listed = _checked(archive, place / ARCHIVED)
         study = _study_of(archive, listed)
-        yield Opened(
-            str(archive), place, folder is not None, study, listed, installed.compared(place / ARCHIVED, listed)
-        )
+        code = installed.compared(place / ARCHIVED, listed)
+        yield Opened(str(archive), place, folder is not None, study, listed, code)
 
 
 def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
@@ -145,44 +136,38 @@ def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
     return sandbox.unconfined(unpacked.folder / REBUILT)
 
 
-def rebuild(unpacked: Opened, way: Way, cores: int = 1, tell: Tell = lambda text: None) -> Rebuilt:
+def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     """Make the results of an archive again, where there are none, and compare them with the archive's own.
 
     It executes the archive's own code, unless that is the installed. Python and libraries are those of this process.
     Raises RunError with the run's last lines if that fails.
     """
-    ours = unpacked.code.is_installed
-    by = f"the installed code, stiffdice {__version__}" if ours else "the archive's own code, not the installed"
     notes = other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
     _fill(unpacked)
-    said = _run(unpacked, way, cores, tell)
+    said = _run(unpacked, way, cores)
     notes += [line for line in said if "left out:" in line]
     found = _compared(unpacked)
     if found.files == 0 and found.same:
         notes.append("there was nothing to compare")
-    if not ours:
+    if not unpacked.code.is_installed:
         notes.append(f"{unpacked.code}; equal files say that its own code gives them, not what this computes")
-    if not ours and way.could:
-        notes.append(f"it ran {way}, and could have copied the archive's results")
-    folder = str(unpacked.folder) if unpacked.kept else None
-    return Rebuilt(unpacked.archive, unpacked.study, by, folder, found, notes)
+        if way.could:
+            notes.append(f"it ran {way}, and could have copied the archive's results")
+    return Rebuilt(unpacked, found, notes)
 
 
 @contextmanager
 def _place(folder: str | Path | None) -> Iterator[Path]:
-    """Give an empty folder; a temporary one is gone afterwards, another if anything but the run fails."""
+    """Give a new folder; a temporary one is gone afterwards, another if anything but the run fails."""
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True) as temporary:
             yield Path(temporary)
         return
     place = Path(folder)
     try:
-        place.mkdir(mode=0o700, exist_ok=True)
-        is_empty = not any(place.iterdir())
+        place.mkdir(mode=0o700)
     except OSError as error:
         raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
-    if not is_empty:
-        raise OutputError(f"{place}: is not empty; name a new folder")
     try:
         yield place
     except RunError:
@@ -220,16 +205,11 @@ def other_versions(lock: Path) -> list[str]:
     if not lock.is_file():
         return ["no requirements/requirements.lock: it is not known which versions made it"]
     found = []
-    pinned = re.findall(
-        r"^([A-Za-z0-9][A-Za-z0-9._-]*)==([^\s;\\]+)(?: *;[^\n]*)?", text_of(lock, LARGEST_TABLE), re.MULTILINE
-    )
+    pinned = re.findall(r"^([A-Za-z0-9][A-Za-z0-9._-]*)==([^\s;\\]+)", text_of(lock, LARGEST_TABLE), re.MULTILINE)
     for name, locked in pinned:
-        try:
-            here = version(name)
-        except PackageNotFoundError:
-            continue  # for another system, or not needed for a run
-        if here != locked:
-            found.append(f"{name} {here} is installed; the archive's lock says {locked}")
+        with suppress(PackageNotFoundError):  # for another system, or not needed for a run
+            if (here := version(name)) != locked:
+                found.append(f"{name} {here} is installed; the archive's lock says {locked}")
     return found
 
 
@@ -245,22 +225,15 @@ def _fill(unpacked: Opened) -> None:
             shutil.copy(unpacked.folder / ARCHIVED / name, target)
 
 
-def _run(unpacked: Opened, way: Way, cores: int, tell: Tell) -> list[str]:
+def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
     """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
-    expected = [name for name in unpacked.listed if name.startswith(f"results/{unpacked.study}/")]
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
     command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
     folder, log = unpacked.folder / REBUILT, unpacked.folder / LOG
     with log.open("wb") as out:
         running = sandbox.start(way, command, folder, out)
         try:
-            told = -1
-            while running.poll() is None:
-                there = sum((folder / name).exists() for name in expected)
-                if there * 10 // len(expected) > told:
-                    told = there * 10 // len(expected)
-                    tell(f"running: {there} of {len(expected)} files are there")
-                time.sleep(0.2)
+            running.wait()
         finally:
             sandbox.end(running)
     lines = _last_of(log).splitlines()

@@ -21,11 +21,11 @@ import psutil
 from stiffdice.errors import RefusedError
 
 _INSIDE = Path("/rebuilt")  # where a sandbox has the folder
+_HOME, _TEMPORARY = ".home", ".home/tmp"  # in it
 
 # Of /etc, what programs read before they do anything: where libraries are, which of two is the default, fonts.
 _OF_ETC = ("ld.so.cache", "alternatives", "fonts", "octaverc", "octave.conf", "localtime")
 
-_NOWHERE = "http://127.0.0.1:9"
 _NEEDED = ("snakemake", "numba", "h5py")
 _PATIENCE = 5.0  # seconds for what was killed to be gone
 
@@ -51,7 +51,7 @@ def sandboxed(folder: Path) -> Way:
     program = shutil.which("bwrap")
     if program is None:
         raise RefusedError("there is no sandbox: bubblewrap (bwrap) is not installed")
-    temporary = _made(folder / ".home" / "tmp")
+    (temporary := folder.resolve() / _TEMPORARY).mkdir(parents=True, exist_ok=True)
     # Root, with its capabilities, could make writable again what it may only read.
     prefix = [program, "--unshare-all", "--cap-drop", "ALL", "--die-with-parent", "--new-session"]
     prefix += ["--proc", "/proc", "--dev", "/dev", "--bind", str(temporary), "/tmp", *_readable(folder)]
@@ -107,30 +107,25 @@ def unconfined(folder: Path) -> Way:
 
 
 def environment(way: Way) -> dict[str, str]:
-    """Return the environment variables of a command: a home in the folder, a proxy to nowhere, none of who runs it.
+    """Return the environment variables of a command: a home in the folder, none of who runs it.
 
     Outside of a sandbox Python may need to be told where its libraries are.
     """
-    home = way.folder / ".home"
-    proxies = ("http_proxy", "https_proxy", "ftp_proxy", "all_proxy")
     kept = {name: os.environ[name] for name in ("LD_LIBRARY_PATH",) if way.could and name in os.environ}
     return kept | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.defpath]),
-        "HOME": str(home),
+        "HOME": str(way.folder / _HOME),
         "USER": "nobody",  # where no file says the user's name
-        "TMPDIR": str(home / "tmp"),
-        "XDG_CACHE_HOME": str(home / "cache"),
-        "XDG_CONFIG_HOME": str(home / "config"),
+        "TMPDIR": str(way.folder / _TEMPORARY),
         "LANG": "C.UTF-8",
         "PYTHONPATH": str(way.folder / "src"),
         "PYTHONNOUSERSITE": "1",
-        **dict.fromkeys([*proxies, *map(str.upper, proxies)], _NOWHERE),
     }
 
 
 def start(way: Way, command: list[str], folder: Path, out: IO[bytes]) -> subprocess.Popen[bytes]:
     """Start a command in a folder; out: where all goes that it says."""
-    _made(folder / ".home" / "tmp")
+    (folder / _TEMPORARY).mkdir(parents=True, exist_ok=True)
     return subprocess.Popen(
         [*way.prefix, *command],
         cwd=folder,
@@ -153,8 +148,3 @@ def end(running: subprocess.Popen[bytes]) -> None:
         running.wait(_PATIENCE)
     running.kill()
     running.wait()
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder.resolve()

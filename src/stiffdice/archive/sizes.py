@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 from zipfile import ZipInfo
 
-from stiffdice.archive.contents import KINDS
-
 MANY = 1_000_000  # runs of a study that sizes are stated for
 
 
@@ -28,12 +26,11 @@ class Size(NamedTuple):
 class Sizes(NamedTuple):
     """What an archive holds, without the three files that describe it.
 
-    kinds: by the name of the kind, those there are. total: of all kinds. runs: how many runs of sweeps; shards: the
-    files that hold them.
+    kinds: by the name of the kind, those there are, and `all`. runs: how many runs of sweeps; shards: the files that
+    hold them.
     """
 
     kinds: Mapping[str, Size]
-    total: Size
     runs: int
     shards: Size
 
@@ -41,11 +38,6 @@ class Sizes(NamedTuple):
     def per_run(self) -> tuple[float, float] | None:
         """Bytes of shards for one run, unpacked and packed; None if there are no runs."""
         return (self.shards.bytes / self.runs, self.shards.packed / self.runs) if self.runs else None
-
-    @property
-    def rows(self) -> list[tuple[str, Size]]:
-        """The lines of a table: every kind by its name for people, then all of them."""
-        return [*((KINDS[kind], size) for kind, size in self.kinds.items()), ("all", self.total)]
 
     @property
     def sentence(self) -> str:
@@ -58,9 +50,15 @@ class Sizes(NamedTuple):
             f"a million such runs: {in_megabytes(each * MANY)}, {in_megabytes(packed * MANY)} packed"
         )
 
+    def as_data(self) -> dict[str, object]:
+        """Return it for programs."""
+        each, packed = self.per_run or (None, None)
+        kinds = {kind: size._asdict() for kind, size in self.kinds.items()}
+        return {"kinds": kinds, "runs": self.runs, "bytes_per_run": each, "packed_bytes_per_run": packed}
+
     def __str__(self) -> str:
         lines = [f"{'':22}{'files':>6}{'unpacked':>12}{'packed':>12}"]
-        for name, size in self.rows:
+        for name, size in self.kinds.items():
             lines.append(f"{name:22}{size.files:6}{in_megabytes(size.bytes):>12}{in_megabytes(size.packed):>12}")
         return "\n".join([*lines, self.sentence]).rstrip("\n")
 

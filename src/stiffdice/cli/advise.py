@@ -11,6 +11,7 @@ from stiffdice.errors import InputError, printable
 if TYPE_CHECKING:
     from stiffdice.scene.scene import Scene
 
+HELP = "say how to run a scene to an error you choose: model, scheme, steps, time"
 EXAMPLES = """\
 examples:
   stiffdice advise config/scenes/figure-04.yaml --error 1%
@@ -19,13 +20,11 @@ examples:
   stiffdice advise config/scenes/figure-09.yaml --error 1% --horizon 2 --run -o advised.h5
   stiffdice advise config/scenes/figure-09.yaml --scheme symplectic_euler --json
 
-The error is the root mean square distance of the cube's centre from the exact path, over evenly spread times from the
-launch to the end (or the horizon), in radii of the cube: 1% of a 1 m cube is 1 cm. A tumbling cube is chaotic, and a
-path may be known for a part of the duration only; the advice is then for that part, and says so. A pilot run ends after
-3,000,000 force evaluations: all of it takes about ten seconds, and more where something has to be compiled.
-Where there is no SCENE.yaml, keys not given have the paper's values. The first advice on a machine compiles, which may
-take a minute. Exit status: 0 for an advice, with --run for a promise kept; 1 if nothing keeps the error, with --run if
-the promise is found broken; 2 for bad input.
+The error is the root mean square distance of the cube's centre from the exact path until the end (or the horizon), in
+radii of the cube: 1% of a 1 m cube is 1 cm. A path that is chaotic may be known for a part of the duration only; the
+advice is then for that part (docs/advice.md). It takes about ten seconds; the first on a machine compiles, which may
+take a minute. Where there is no SCENE.yaml, keys not given have the paper's values. Exit status: 0 for an advice, with
+--run for a promise kept; 1 if nothing keeps the error or the promise is broken; 2 for bad input.
 """
 
 # Keys of the scene that `advise` has an option for, and what they are.
@@ -48,31 +47,19 @@ _VECTORS = ("position", "velocity", "spin")
 _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    advise = common.add_command(
-        commands,
-        "advise",
-        _advise,
-        "say how to run a scene to an error you choose: model, scheme, steps, time",
-        EXAMPLES,
-    )
-    advise.add_argument(
-        "scene", metavar="SCENE.yaml", nargs="?", help="the physical problem; without it, the options below"
-    )
-    advise.add_argument(
-        "--error", default="1%", metavar="X", help="as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
-    )
+def add(advise: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
+    told = "the physical problem; without it, the options below"
+    advise.add_argument("scene", metavar="SCENE.yaml", nargs="?", help=told)
+    told = "as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
+    advise.add_argument("--error", default="1%", metavar="X", help=told)
     advise.add_argument("--horizon", metavar="T", help="until when to keep it [s] (default: the duration)")
     advise.add_argument("--scheme", metavar="NAME", help="advice for this scheme alone (default: all are compared)")
-    advise.add_argument(
-        "--run",
-        action="store_true",
-        help="do it, and check the promise against a run of twice the cost and another method",
-    )
+    told = "do it, and check the promise against a run of twice the cost and another method"
+    advise.add_argument("--run", action="store_true", help=told)
     advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
-    common.add_json(advise)
-    common.add_force(advise)
+    advise.add_argument("--json", action="store_true", help="the same for programs")
+    advise.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
     common.add_changes(advise)
     scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
     either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
@@ -103,7 +90,8 @@ def _in_radii(text: str, scene: Scene) -> str:
         return text
 
 
-def _advise(options: argparse.Namespace) -> int:
+def call(options: argparse.Namespace) -> int:
+    """Print the advice; 1 if there is none, or its promise is not kept."""
     from stiffdice.io import seal
     from stiffdice.scene import scene as scenes
 
@@ -113,18 +101,18 @@ def _advise(options: argparse.Namespace) -> int:
     else:
         scene = scenes.load(options.scene, changes, options.preset)
     horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
-    if options.output is not None and not options.run:
-        raise InputError("-o: a file is written with --run only")
     target = None
     if options.output is not None:
+        if not options.run:
+            raise InputError("-o: a file is written with --run only")
         target = common.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
-    from stiffdice.advice import report as advice_text
     from stiffdice.advice.check import check as checked
     from stiffdice.advice.check import run_advised
     from stiffdice.cli.progress import notes, progress
+    from stiffdice.report import advice_page
     from stiffdice.simulation.outcome import Verdict
 
     error = recommend.parsed_error(_in_radii(options.error, scene))
@@ -142,13 +130,13 @@ def _advise(options: argparse.Namespace) -> int:
 
             write_dataset(run_dataset(run), target)
     if options.json:
-        print(advice_text.as_json(given, check))
+        print(advice_page.as_json(given, check))
     else:
         for line in scene.derived:
             print(line)
-        print(advice_text.as_text(given, common.scene_words(options, changes) if options.scene else []))
+        print(advice_page.as_text(given, common.scene_words(options, changes) if options.scene else []))
         if check is not None:
-            print("\n" + advice_text.check_as_text(check))
+            print("\n" + advice_page.check_as_text(check))
             if target is not None:
                 print(printable(f"{target}: {Verdict(run.verdict[0]).sentence}"))
     return 0 if given.best is not None and (check is None or check.kept) else 1

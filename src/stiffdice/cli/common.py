@@ -1,71 +1,43 @@
-"""What the commands have in common: how one is added, numbers as people type them, changes of a scene, targets."""
+"""What the commands have in common: numbers as people type them, changes of a scene, studies, targets."""
 
 from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
 from stiffdice.errors import InputError
 
+if TYPE_CHECKING:
+    from stiffdice.study.config import Study
+
+SCHEMA = "workflow/schemas/study.schema.yaml"
 # Of a duration over a step size: as near as this to a whole number of steps is rounding.
 _WHOLE = 1e-12
-
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-
-
-def add_command(
-    commands: Commands, name: str, call: Callable[[argparse.Namespace], int | None], text: str, examples: str
-) -> argparse.ArgumentParser:
-    """Add a command to the parser, and return its own.
-
-    call: takes the parsed options and returns the exit status, or None for 0. text: what the command does, for its own
-    help and the list of commands; examples: come after the options.
-    """
-    command = commands.add_parser(
-        name,
-        help=text,
-        description=f"{text[0].upper()}{text[1:]}.",
-        epilog=examples,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    command.set_defaults(call=call)
-    return command
-
-
-def add_json(command: argparse.ArgumentParser) -> None:
-    """Add the option for programs."""
-    command.add_argument("--json", action="store_true", help="the same for programs")
 
 
 def whole(option: str, text: str) -> int:
     """Return the whole number in an option's text; 1e5 counts as one."""
     from stiffdice.scene import validation
 
-    try:
-        return validation.count(option, int(text))
-    except ValueError:
-        pass
-    try:
-        return validation.count(option, float(text))
-    except ValueError:
-        comma = "; write it without a comma" if "," in text else ""
-        raise InputError(
-            f"{option} = {text}: allowed is a whole number from 1 to {validation.LARGEST_COUNT}{comma}"
-        ) from None
+    return validation.count(option, _value(text))
 
 
 def number(option: str, text: str, unit: str, *, above: float | None = None) -> float:
     """Return the number in an option's text, which may have a unit; unit: that of the result, `1` if it has none."""
     from stiffdice.scene import validation
 
-    try:
-        value: object = float(text)
-    except ValueError:
-        value = text
-    return validation.number(option, value, unit, above=above)
+    return validation.number(option, _value(text), unit, above=above)
+
+
+def _value(text: str) -> float | str:
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def steps_of(text: str, duration: float) -> tuple[int, str]:
@@ -114,16 +86,20 @@ def _change(text: str) -> str:
     return text
 
 
-def add_force(command: argparse.ArgumentParser) -> None:
-    """Add the option that replaces whatever is there."""
-    command.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
+def check_folder() -> None:
+    """Raise InputError unless this is the project's folder."""
+    if not Path(SCHEMA).is_file():
+        raise InputError(f"{SCHEMA}: No such file; call this in the project's folder")
 
 
-def name_of(option: str, text: str) -> Path:
-    """Return the path in an option's text; raises InputError for `-`, which elsewhere means standard output."""
-    if text == "-":
-        raise InputError(f"{option} -: nothing is written to standard output; allowed is a name (./- for this one)")
-    return Path(text)
+def study_of(name: str) -> Study:
+    """Return the study in config/NAME.yaml; raises InputError if it is none, or outside of the project's folder."""
+    from stiffdice.study import config
+
+    check_folder()
+    if not config.NAME.fullmatch(name):
+        raise InputError(f"STUDY = {name}: allowed is the name of a file in config/, without .yaml")
+    return config.load(f"config/{name}.yaml", SCHEMA)
 
 
 def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources: str) -> Path:
@@ -134,14 +110,11 @@ def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources:
     """
     from stiffdice.io.writer import check_target
 
-    target = check_target(name_of("-o", text))
+    target = check_target(text)
     if not target.exists():
         return target
     if any(target.samefile(source) for source in sources):
         raise InputError(f"{target}: is the scene itself; name another file for the output")
-    try:
-        if force or target.stat().st_size == 0 or is_ours(target):
-            return target
-    except OSError as error:
-        raise InputError(f"{target}: {error.strerror}") from None
+    if force or target.stat().st_size == 0 or is_ours(target):
+        return target
     raise InputError(f"{target}: is there already, and no such file of stiffdice; name another, or add --force")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from stiffdice.cli import common
-
+HELP = "say whether two results differ, where, and by how much"
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-09.yaml -o listed.h5
@@ -16,25 +15,21 @@ examples:
   cp -r results/quick before
   stiffdice diff before results/quick --json
 
-The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. A unit in the last place
-(ulp) is the step from one double to the next. The shards of a sweep are compared cell by cell, however the cells are
-dealt to them. Logs, times, reports, and figures and tables that show times differ from one rebuild to the next; they
-are left out, unless --all is given.
+The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. Logs, times, and what shows
+times differ from one rebuild to the next; they are left out, unless --all is given. docs/diff.md says more.
 """
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    diff = common.add_command(
-        commands, "diff", _diff, "say whether two results differ, where, and by how much", EXAMPLES
-    )
+def add(diff: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
     diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
     diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")
     diff.add_argument("--json", action="store_true", help="the same for programs, and all of it")
 
 
-def _diff(options: argparse.Namespace) -> int:
+def call(options: argparse.Namespace) -> int:
+    """Print what differs; 1 if anything does."""
     from stiffdice.archive.compare.compare import compare
 
     found = compare(options.a, options.b, all_files=options.all)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from stiffdice.cli import common
-
+HELP = "say what a file holds: its verdict, its scene, its variables"
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-04.yaml -o throw.h5
@@ -16,16 +15,14 @@ examples:
 """
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    inspect = common.add_command(
-        commands, "inspect", _inspect, "say what a file holds: its verdict, its scene, its variables", EXAMPLES
-    )
+def add(inspect: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     inspect.add_argument("file", metavar="FILE.h5")
-    common.add_json(inspect)
+    inspect.add_argument("--json", action="store_true", help="the same for programs")
 
 
-def _inspect(options: argparse.Namespace) -> None:
+def call(options: argparse.Namespace) -> None:
+    """Print what the file holds."""
     from stiffdice.io import isolation
     from stiffdice.io.reader import open_file
     from stiffdice.report import file_page

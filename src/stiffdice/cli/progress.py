@@ -28,25 +28,6 @@ class _Line:
 
 
 @contextmanager
-def _if_slow(call: Callable[[], None]) -> Iterator[None]:
-    """Call a function once, if the block takes longer than QUIET_SECONDS."""
-    timer = threading.Timer(QUIET_SECONDS, call)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-
-
-@contextmanager
-def told_if_slow(what: str) -> Iterator[None]:
-    """Say in a line on standard error what the block does, if it takes longer."""
-    with _if_slow(lambda: print(f"stiffdice: {what} ...", file=sys.stderr, flush=True)):
-        yield
-
-
-@contextmanager
 def progress() -> Iterator[Callable[[float], None]]:
     """Give a function that shows the fraction done: every ten seconds, on a terminal five times a second."""
     line, next_time = _Line(), time.monotonic() + QUIET_SECONDS
@@ -70,7 +51,7 @@ def progress() -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def notes(what: str) -> Iterator[Callable[[str], None]]:
-    """Give a function that takes what the command `what` does next, and shows it once two seconds are over."""
+    """Say what the block does, once two seconds are over; give a function that takes what it does next."""
     line, text = _Line(), what
 
     def show(doing: str) -> None:
@@ -79,8 +60,11 @@ def notes(what: str) -> Iterator[Callable[[str], None]]:
         if line.is_shown:
             line.say(text)
 
-    with _if_slow(lambda: line.say(f"{text} (a first time compiles, which may take a minute)")):
-        try:
-            yield show
-        finally:
-            line.clear()
+    timer = threading.Timer(QUIET_SECONDS, lambda: line.say(f"{text} ..."))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield show
+    finally:
+        timer.cancel()
+        line.clear()

@@ -17,26 +17,23 @@ if TYPE_CHECKING:
     from stiffdice.archive.rebuild import Opened
     from stiffdice.archive.sandbox import Way
 
+HELP = "make an archive again from its own content, and compare"
 EXAMPLES = f"""\
 examples:
   make archive STUDY=quick
   stiffdice rebuild results/archives/quick-{__version__}.crate.zip
   stiffdice rebuild results/archives/quick-{__version__}.crate.zip --cores 4 -o again
 
-Where the archive's code is the installed code, file by file, nothing of a stranger's is executed, and nothing asked.
-Other code is the archive's own: it says so, asks, and runs that in a sandbox (bubblewrap), or not at all. The archive
-is checked first, and not run if anything in it fails. Exit status: 0 if all data and figures are the same, 1 if some
-differ, 2 if the archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
+The archive is checked first. Its own code, where that is not the installed code, file by file, is run after asking, in
+a sandbox (bubblewrap), or not at all. Exit status: 0 if all data and figures are the same, 1 if some differ, 2 if the
+archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
 """
 
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    rebuild = common.add_command(
-        commands, "rebuild", _rebuild, "make an archive again from its own content, and compare", EXAMPLES
-    )
+def add(rebuild: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     rebuild.add_argument("archive", metavar="ARCHIVE")
     rebuild.add_argument("-o", "--output", metavar="FOLDER", help="run it in this new folder, and leave it there")
     rebuild.add_argument("--cores", default="1", metavar="N", help="jobs at once (default: 1)")
@@ -46,9 +43,8 @@ def add(commands: common.Commands) -> None:
     )
 
 
-def _rebuild(options: argparse.Namespace) -> int:
-    if options.output is not None:
-        common.name_of("-o", options.output)
+def call(options: argparse.Namespace) -> int:
+    """Rebuild and print what differs; 1 if anything does."""
     cores = common.whole("--cores", options.cores)
 
     # This takes about a second to import; bad input is told before.
@@ -56,13 +52,13 @@ def _rebuild(options: argparse.Namespace) -> int:
     from stiffdice.cli.progress import notes
 
     with _told_to_stop(), ExitStack() as stack:
-        with notes("rebuild:") as tell:
-            unpacked = stack.enter_context(opened(options.archive, options.output, tell))
+        with notes("stiffdice: unpacking and checking the archive"):
+            unpacked = stack.enter_context(opened(options.archive, options.output))
             way = way_of(unpacked, not options.no_sandbox)
         if not unpacked.code.is_installed and not options.yes:
             _ask(unpacked, way)
-        with notes("rebuild:") as tell:
-            rebuilt = rebuild(unpacked, way, cores, tell)
+        with notes(f"stiffdice: rebuilding {unpacked.study}"):
+            rebuilt = rebuild(unpacked, way, cores)
     print("\n".join(rebuilt.lines()))
     return 0 if rebuilt.ok else 1
 

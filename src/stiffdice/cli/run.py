@@ -9,6 +9,7 @@ import sys
 from stiffdice.cli import common
 from stiffdice.errors import printable
 
+HELP = "run one scene and store its trajectory and verdict in one HDF5 file"
 EXAMPLES = """\
 examples:
   stiffdice run config/scenes/figure-04.yaml --steps 100000 -o throw.h5
@@ -22,61 +23,36 @@ its verdict; 2 for bad input.
 """
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    run = common.add_command(
-        commands, "run", _run, "run one scene and store its trajectory and verdict in one HDF5 file", EXAMPLES
-    )
+def add(run: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
-    run.add_argument(
-        "--model",
-        default="tumbling",
-        metavar="M",
-        help="vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)",
-    )
-    run.add_argument(
-        "--simulator",
-        default="stiffdice",
-        metavar="NAME",
-        help="stiffdice, or another engine where it is installed: mujoco, pybullet, drake, scipy, octave, numpy "
-        "(default: stiffdice)",
-    )
-    run.add_argument(
-        "--scheme",
-        metavar="NAME",
-        help="symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, "
-        "or exact where that is known (default: symplectic_euler; another engine has its own)",
-    )
+    told = "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)"
+    run.add_argument("--model", default="tumbling", metavar="M", help=told)
+    told = "stiffdice, or mujoco, pybullet, drake, scipy, octave, numpy where installed (default: stiffdice)"
+    run.add_argument("--simulator", default="stiffdice", metavar="NAME", help=told)
+    told = "symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
+    run.add_argument("--scheme", metavar="NAME", help=told)
     steps = run.add_mutually_exclusive_group()
     steps.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
     steps.add_argument("--dt", metavar="H", help="in place of --steps: the longest step, as 1e-4 or '0.1 ms' [s]")
-    run.add_argument(
-        "--tolerance",
-        metavar="X",
-        help="of the error, for a scheme that controls its own (default: 1e-9 of the motion)",
+    told = "of the error, for a scheme that controls its own (default: 1e-9 of the motion)"
+    run.add_argument("--tolerance", metavar="X", help=told)
+    run.add_argument("--every", metavar="K", help="keep every K-th step (default: at most 10,000 are kept)")
+    told = (
+        "most force evaluations of event, exact and scipy (default: 1e7), most steps of all others (default: all); "
+        "a run that needs more is stored as undecided"
     )
+    run.add_argument("--budget", metavar="N", help=told)
     run.add_argument(
-        "--every",
-        metavar="K",
-        help="keep every K-th step (default: the least K that keeps at most 10,000 of them)",
+        "--ledger", action="store_true", help="book where the energy goes, bounce by bounce (takes longer)"
     )
-    run.add_argument(
-        "--budget",
-        metavar="N",
-        help="most force evaluations of a run by event, exact or scipy, which take steps of their own, and most steps "
-        "of any other; a run that needs more is stored with the verdict undecided (default: 1e7; all steps)",
-    )
-    run.add_argument(
-        "--ledger",
-        action="store_true",
-        help="book where the energy goes, for every bounce and for the run (takes some times as long)",
-    )
-    common.add_force(run)
+    run.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
     common.add_changes(run)
 
 
-def _run(options: argparse.Namespace) -> None:
+def call(options: argparse.Namespace) -> None:
+    """Run the scene, store the run, and print its verdict."""
     from stiffdice.io import seal
     from stiffdice.scene import scene as scenes
     from stiffdice.scene import validation
@@ -101,11 +77,9 @@ def _run(options: argparse.Namespace) -> None:
     if options.ledger:
         validation.choice("--ledger: simulator", setup.simulator, [backend.OURS])
         validation.choice("--ledger: scheme", setup.scheme, energy_budget.BOOKED)
-    every = (
-        default_every(steps)
-        if options.every is None
-        else validation.count("every", common.whole("--every", options.every), at_most=steps)
-    )
+    every = default_every(steps)
+    if options.every is not None:
+        every = validation.count("every", common.whole("--every", options.every), at_most=steps)
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
     for line in run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps):

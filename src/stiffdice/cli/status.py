@@ -15,6 +15,7 @@ from stiffdice.cli import common
 if TYPE_CHECKING:
     from stiffdice.study.status import Status
 
+HELP = "say how far a study is: done, running, failed and why, time left, disk used"
 EXAMPLES = """\
 examples:
   stiffdice status                  # every study that has results, a line each
@@ -26,65 +27,57 @@ examples:
 To be called in the project's folder. Exit status: 0 all is done; 1 something failed; 3 something is not done yet;
 2 bad input.
 """
-SCHEMA = "workflow/schemas/study.schema.yaml"
 SECONDS = 2.0
 # Between two jobs nothing runs for a moment: only so many looks in a row tell that a run has ended.
 QUIET = 4
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    status = common.add_command(
-        commands,
-        "status",
-        _status,
-        "say how far a study is: done, running, failed and why, time left, disk used",
-        EXAMPLES,
-    )
+def add(status: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     status.add_argument("study", metavar="STUDY", nargs="?", help="a file in config/, without .yaml")
     status.add_argument("--watch", action="store_true", help="look every two seconds, until the run has ended")
-    status.add_argument("--cores", type=int, metavar="N", help="for the time left (default: as many as are at work)")
-    common.add_json(status)
+    status.add_argument("--cores", metavar="N", help="for the time left (default: as many as are at work)")
+    status.add_argument("--json", action="store_true", help="the same for programs")
 
 
-def _status(options: argparse.Namespace) -> int:
-    from stiffdice.errors import InputError
+def call(options: argparse.Namespace) -> int:
+    """Print how far the study is; with --watch again, until all is done, or the run seen at work has ended."""
+    from stiffdice.study.status import State
 
-    if options.cores is not None and options.cores < 1:
-        raise InputError(f"--cores = {options.cores}: allowed is a whole number from 1")
-    if options.watch:
-        return _watch(options)
-    found = _found(options)
-    _tell(found, options)
-    return _exit_status(found)
+    options.cores = None if options.cores is None else common.whole("--cores", options.cores)
+    ended, quiet, seen = 3, 0, False
+    with contextlib.suppress(KeyboardInterrupt) if options.watch else contextlib.nullcontext():
+        while True:
+            found = _found(options)
+            _tell(found, options)
+            running = any(status.those(State.RUNNING) for status in found)
+            seen, quiet, ended = seen or running, 0 if running else quiet + 1, _exit_status(found)
+            if not options.watch or (quiet >= QUIET if seen else ended == 0):
+                break
+            time.sleep(SECONDS)
+    return ended
 
 
 def _found(options: argparse.Namespace) -> list[Status]:
     """Return how far the study is that is named, or each that has results."""
-    from stiffdice.cli.progress import told_if_slow
-    from stiffdice.errors import InputError
-    from stiffdice.study import config as study
+    from stiffdice.cli.progress import notes
     from stiffdice.study import status
 
-    if not Path(SCHEMA).is_file():
-        raise InputError(f"{SCHEMA}: No such file; call stiffdice status in the project's folder")
-    if options.study is not None and not study.NAME.fullmatch(options.study):
-        raise InputError(f"STUDY = {options.study}: allowed is the name of a file in config/, without .yaml")
-    names = [options.study] if options.study is not None else _with_results()
-    with told_if_slow("planning the sweeps"):
-        return [
-            status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name), options.cores) for name in names
-        ]
-
-
-def _with_results() -> list[str]:
-    named = sorted(path.stem for path in Path("config").glob("*.yaml"))
-    return [name for name in named if Path("results", name).is_dir()]
+    common.check_folder()
+    configured = sorted(path.stem for path in Path("config").glob("*.yaml"))
+    with_results = [name for name in configured if Path("results", name).is_dir()]
+    with notes("stiffdice: planning the sweeps"):
+        names = with_results if options.study is None else [options.study]
+        return [status.of(common.study_of(name), Path("results", name), options.cores) for name in names]
 
 
 def _tell(found: list[Status], options: argparse.Namespace) -> None:
     from stiffdice.study import status_report
 
+    if options.watch and sys.stdout.isatty():
+        print("\x1b[H\x1b[J", end="")
+    elif options.watch and not options.json:
+        print()
     if options.json:
         data = [status_report.as_data(status) for status in found]
         indent = None if options.watch else 2  # a line for each look
@@ -103,29 +96,3 @@ def _exit_status(found: list[Status]) -> int:
     if State.FAILED in states:
         return 1
     return 0 if states == {State.DONE} else 3
-
-
-def _watch(options: argparse.Namespace) -> int:
-    """Tell again and again, until all is done, or the run that was seen at work has ended, or Ctrl-C."""
-    from stiffdice.study.status import State
-
-    ended, quiet, seen = 3, 0, False
-    with contextlib.suppress(KeyboardInterrupt):
-        while True:
-            found = _found(options)
-            _clear(options)
-            _tell(found, options)
-            running = any(status.those(State.RUNNING) for status in found)
-            seen, quiet, ended = seen or running, 0 if running else quiet + 1, _exit_status(found)
-            if quiet >= QUIET if seen else ended == 0:
-                break
-            time.sleep(SECONDS)
-    return ended
-
-
-def _clear(options: argparse.Namespace) -> None:
-    """Begin at the top of an empty screen, or after an empty line."""
-    if sys.stdout.isatty():
-        print("\x1b[H\x1b[J", end="")
-    elif not options.json:
-        print()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 
 from stiffdice import __version__
-from stiffdice.cli import common
+from stiffdice.errors import printable
 
+HELP = "check an archive or a folder of results: digests, seals, schema, physics"
 EXAMPLES = f"""\
 examples:
   make archive STUDY=quick
@@ -20,24 +21,18 @@ at all. docs/verify.md says what is checked, and how to check it without stiffdi
 """
 
 
-def add(commands: common.Commands) -> None:
-    """Add the command to the parser."""
-    verify = common.add_command(
-        commands,
-        "verify",
-        _verify,
-        "check an archive or a folder of results: digests, seals, schema, physics",
-        EXAMPLES,
-    )
+def add(verify: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
     verify.add_argument("path", metavar="ARCHIVE|FOLDER", help="an archive, an unpacked one, results, or an .h5 file")
-    common.add_json(verify)
+    verify.add_argument("--json", action="store_true", help="the same for programs")
 
 
-def _verify(options: argparse.Namespace) -> int:
+def call(options: argparse.Namespace) -> int:
+    """Print the report; 1 if anything fails."""
     from stiffdice.archive.verify import verify
-    from stiffdice.cli.progress import progress
+    from stiffdice.cli.progress import notes
 
-    with progress() as show:
-        report = verify(options.path, show)
+    with notes(f"stiffdice: checking {printable(options.path)}"):
+        report = verify(options.path)
     print(report.as_json() if options.json else "\n".join(report.lines()))
     return 0 if report.ok else 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -19,14 +21,16 @@ def rendered(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]
     lines = [f"# {title}", "", _row(columns), _row(["---"] * len(columns)), *map(_row, texts)]
     if note:
         lines += ["", note]
-    quoted = [",".join(_quoted(part) for part in row) for row in [columns, *texts]]
-    return Table("\n".join(lines) + "\n", "\n".join(quoted) + "\n")
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([columns, *texts])
+    return Table("\n".join(lines) + "\n", stream.getvalue())
 
 
 def _row(parts: Sequence[str]) -> str:
     return "| " + " | ".join(part.replace("|", "\\|") for part in parts) + " |"
 
 
-def _quoted(part: str) -> str:
-    """Return a field as RFC 4180 has it."""
-    return '"' + part.replace('"', '""') + '"' if any(mark in part for mark in ',"\n') else part
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of one length as indented lines, their columns below each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

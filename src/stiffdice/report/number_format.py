@@ -12,10 +12,13 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GROUND = {"stiffness": "S = {} kg/s²", "damping": "D = {} kg/s", "friction": "μ = {}"}
 
 
+_TIMES = {"years": 365.25 * 86400, "days": 86400, "h": 3600, "min": 60, "s": 1, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
+
+
 def readable(value: float, digits: int | None = None) -> str:
     """Return a number as a person writes it: 10⁶, 2.5×10⁴, 0.075; rounded first, if digits are given."""
     value = value if digits is None else float(f"{value:.{digits}g}")
-    if value == 0 or 1e-3 <= abs(value) < 1e4:
+    if value == 0 or 1e-3 <= abs(value) < 1e4 or not math.isfinite(value):
         return f"{value:g}"
     exponent = math.floor(math.log10(abs(value)))
     mantissa = f"{value / 10.0**exponent:.3g}"
@@ -23,12 +26,15 @@ def readable(value: float, digits: int | None = None) -> str:
     return power if mantissa == "1" else f"{mantissa}×{power}"
 
 
-def duration(seconds: float) -> str:
-    """Return a time in its unit, from ns to s."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
+def duration(seconds: float, digits: int = 3) -> str:
+    """Return a time in the unit that suits it, from ns to years."""
+    unit = next((name for name, size in _TIMES.items() if seconds >= size), "ns")
+    return f"{readable(seconds / _TIMES[unit], digits)} {unit}"
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or none where it is not one that JSON has."""
+    return value if math.isfinite(value) else None
 
 
 def scene_of(found: xr.Dataset) -> dict[str, Any]:

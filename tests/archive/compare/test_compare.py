@@ -82,7 +82,6 @@ def test_ulps_at_the_ends(a, b, told):
 def test_ulps_of_shorter_floats_are_their_own():
     assert apart(1.0, 1.0 + 2**-23, np.float32) == 1
     assert apart(-65504, np.inf, np.float16) == 2 * 0x7BFF + 1
-    assert apart(1.0, 1.0 + 2**-52, ">f8") == 1
 
 
 def of(a, b, **about):
@@ -97,7 +96,7 @@ def test_kinds_of_difference_are_told_apart():
     found = of(a, b, units="m")
     assert (found.count, found.of) == (5, 8)
     assert found.unmeasured == 3  # one NaN, two infinities; the sign of zero is 0 ulp
-    assert [(place.where, place.index) for place in found.places] == [("first at k 1", (1,)), ("largest at k 7", (7,))]
+    assert [place.where for place in found.places] == ["first at k 1", "largest at k 7"]
     assert (found.ulp, found.relative, found.absolute) == (2**50, 0.2, 0.5)
 
 
@@ -109,10 +108,7 @@ def test_the_largest_of_each_kind_is_found():
 
 def test_the_first_and_the_largest_place_are_told():
     a, b = np.ones(8), np.linspace(1, 2, 8)
-    assert [(place.where, place.index) for place in of(a, b).places] == [
-        ("first at k 1", (1,)),
-        ("largest at k 7", (7,)),
-    ]
+    assert [place.where for place in of(a, b).places] == ["first at k 1", "largest at k 7"]
     assert [place.where for place in of(a, b[::-1]).places] == ["first and largest at k 0"]
     assert [place.where for place in of([1.0, 2.0], [1.0, 3.0]).places] == ["at k 1"]
     assert [place.where for place in of([1.0, 2.0], [np.nan, np.inf]).places] == ["first at k 0"]
@@ -165,7 +161,7 @@ def rewritten(path, run, **values):
 def test_equal_files_are_the_same(pair):
     found = compare(*pair)
     assert found.same
-    assert found.lines() == ["the same, byte for byte"]
+    assert found.lines() == ["the same, byte for byte: 1 file"]
 
 
 def test_one_bit_is_found(pair, run):
@@ -176,14 +172,15 @@ def test_one_bit_is_found(pair, run):
     (values,) = found.differences[0].values
     (place,) = values.places
     assert (values.variable, values.units, values.count, values.of) == ("position", "m", 1, 303)
-    assert (place.index, place.where) == ((25, 2), "at time = 2.5 s, axis z")
+    assert place.where == "at time = 2.5 s, axis z"
     assert (float(place.a), float(place.b)) == (value, np.nextafter(value, np.inf))
     assert values.ulp == 1
     assert values.absolute == pytest.approx(np.spacing(value))
     lines = found.lines()
-    assert lines[0].startswith("different: numbers (up to 1 ulp, ")
-    assert lines[1].startswith("position: 1 of 303 values differ, by up to 1 ulp, ")
-    assert lines[2] == f"  at time = 2.5 s, axis z [25, 2]: {place.a} against {place.b}"
+    assert lines[0].startswith("different: numbers in 1 file (up to 1 ulp, ")
+    assert lines[1:3] == ["", "a.h5"]
+    assert lines[3].startswith("  position: 1 of 303 values differ, by up to 1 ulp, ")
+    assert lines[4] == f"    at time = 2.5 s, axis z: {place.a} against {place.b}"
 
 
 def test_kinds_are_told_in_words(pair, run):
@@ -192,7 +189,7 @@ def test_kinds_are_told_in_words(pair, run):
     text = "\n".join(compare(*pair).lines())
     assert "velocity: 1 of 303 values differ, by up to 0 ulp, 0 of the value, 0 m s-1" in text
     assert "position: 1 of 303 values differ (1 NaN or infinite)" in text
-    assert "at time = 0.4 s, axis y [4, 1]: nan against 1.0" in text
+    assert "at time = 0.4 s, axis y: nan against 1.0" in text
     first, second = str(run["verdict"].attrs["flag_meanings"]).split()[:2]
     assert f"verdict: {first} against {second}" in text
 
@@ -224,16 +221,18 @@ def test_equal_numbers_are_told_although_attributes_differ(pair, run):
     found = compare(*pair)
     assert (found.same, found.numbers_same) == (False, True)
     lines = found.lines()
-    assert lines[0] == "the numbers are the same; different: attributes"
-    assert {line.partition(":")[0] for line in lines[1:]} == {
+    assert lines[0] == "the numbers are the same; different: attributes in 1 file"
+    assert {line.partition(":")[0] for line in lines[1:] if line} == {
         "code_digest",
         "scene_digest",
         "title",
         "position.units",
         "scene.ground.stiffness",
     }
-    assert {"position.units: m against cm", "scene.ground.stiffness: 10000.0 against 5.0"} < set(lines)
-    assert lines[-1] == "title: only in A: A thrown cube"
+    assert {"position.units: m against cm (1 file)", "scene.ground.stiffness: 10000.0 against 5.0 (1 file)"} < set(
+        lines
+    )
+    assert lines[-1] == "title: only in A: A thrown cube (1 file)"
 
 
 def test_readers_do_not_read_a_difference_into_a_single_number(pair):
@@ -248,7 +247,7 @@ def test_other_storage_is_no_difference(pair, run):
     seal.seal(pair[1])
     found = compare(*pair)
     assert found.same
-    assert found.lines() == ["the same numbers and attributes, stored otherwise"]
+    assert found.lines() == ["the same numbers and attributes, stored otherwise: 1 file, 0 of them byte for byte"]
 
 
 def test_variables_types_and_sizes_are_told(pair, run):
@@ -257,11 +256,11 @@ def test_variables_types_and_sizes_are_told(pair, run):
     found = compare(*pair)
     assert not found.numbers_same
     lines = found.lines()
-    assert lines[0] == "different: variables, types or sizes"
-    assert "energy_paper: only in A: f8, 101 time" in lines
-    assert "step: i8, 101 time against i4, 50 time" in lines
-    assert "position: f8, 101 time, 3 axis against f8, 50 time, 3 axis" in lines
-    assert "compared at the 50 places along time that both have" in lines
+    assert lines[0] == "different: variables, types or sizes in 1 file"
+    assert "  energy_paper: only in A: f8, 101 time" in lines
+    assert "  step: i8, 101 time against i4, 50 time" in lines
+    assert "  position: f8, 101 time, 3 axis against f8, 50 time, 3 axis" in lines
+    assert "  compared at the 50 places along time that both have" in lines
 
 
 def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
@@ -269,9 +268,9 @@ def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
     thinned["position"].values[25, 2] = 7.0
     write_dataset(thinned, pair[1])
     lines = compare(*pair).lines()
-    assert "compared at the 51 places along time that both have" in lines
-    assert any(line.startswith("position: 1 of 153 values differ") for line in lines)
-    assert any(line.startswith("  at time = 5 s, axis z ") for line in lines)
+    assert "  compared at the 51 places along time that both have" in lines
+    assert any(line.startswith("  position: 1 of 153 values differ") for line in lines)
+    assert any(line.startswith("    at time = 5 s, axis z: ") for line in lines)
 
 
 def test_json_has_all(pair, run):
@@ -280,7 +279,7 @@ def test_json_has_all(pair, run):
     assert (told["same"], told["numbers_same"], told["files"]) == (False, False, 1)
     (values,) = told["differences"][0]["values"]
     a = repr(float(run["position"][25, 2]))
-    assert values["places"] == [{"where": "at time = 2.5 s, axis z", "index": [25, 2], "a": a, "b": "nan"}]
+    assert values["places"] == [{"where": "at time = 2.5 s, axis z", "a": a, "b": "nan"}]
     assert (values["count"], values["of"], values["unmeasured"], values["ulp"]) == (1, 303, 1, None)
 
 
@@ -362,7 +361,7 @@ def test_one_run_is_found_among_cells_dealt_otherwise(results):
     assert (values["energy_ratio"].count, values["energy_ratio"].of, values["energy_ratio"].ulp) == (2, 90, 1)
     assert (values["steps_done"].count, values["steps_done"].of, values["steps_done"].absolute) == (1, 90, 2)
     place = values["energy_ratio"].places[0]
-    assert place.where.endswith(f"at {law}, stiffness = {told[0]:.10g} kg s-2, steps = {told[1]}, member 0")
+    assert place.where.endswith(f"at contact {law}, stiffness = {told[0]:.10g} kg s-2, steps = {told[1]}, member = 0")
     with xr.open_dataset(shards[0]) as dataset:
         assert repr(float(dataset["energy_ratio"][3, 0])) == place.b
 
@@ -373,7 +372,7 @@ def test_a_missing_shard_is_missing_cells(results):
     found = compare(*results)
     (difference,) = found.differences
     assert (len(difference.only_a), len(difference.only_b), difference.values) == (15, 0, ())
-    assert found.lines()[0] == "different: 15 cells only in A"
+    assert found.lines()[0] == "different: cells only in A in 1 file"
 
 
 def test_a_damaged_shard_is_named(results):
@@ -425,7 +424,7 @@ def test_verdicts_that_changed_are_told_in_the_fields_words(results):
     change_cell(shard, 2, "verdict", lambda row: np.where(np.arange(len(row)) == 1, words.index("sank"), row))
     text = "\n".join(compare(*results).lines())
     assert f"verdict: 1 of 90 values differ\n    1 from {before} to sank\n" in text
-    assert f"steps = {steps}, member 1: {before} against sank" in text
+    assert f"steps = {steps}, member = 1: {before} against sank" in text
 
 
 def test_edges_that_moved_are_told_by_law_and_stiffness(tmp_path, small):
@@ -437,9 +436,9 @@ def test_edges_that_moved_are_told_by_law_and_stiffness(tmp_path, small):
     for name, dataset in (("a.h5", found), ("b.h5", moved)):
         write_dataset(dataset, tmp_path / name)
     lines = compare(tmp_path / "a.h5", tmp_path / "b.h5").lines()
-    assert lines[1].startswith("steps_needed: 1 of ") and "by up to " in lines[1] and ", 3" in lines[1]
+    assert lines[3].startswith("  steps_needed: 1 of ") and "by up to " in lines[3] and ", 3" in lines[3]
     needed = float(found["steps_needed"].values[place])
-    assert lines[2].endswith(f": {needed} against {needed + 3}") and "stiffness = " in lines[2]
+    assert lines[4].endswith(f": {needed} against {needed + 3}") and "stiffness = " in lines[4]
 
 
 @pytest.fixture
@@ -500,7 +499,7 @@ def test_files_are_told_by_what_they_are(studies, run):
     assert found.differences[0].name == "runs/throw.h5"  # numbers first
     lines = found.lines()
     assert lines[0].startswith("different: numbers in 1 file (up to ")
-    assert lines[0].endswith("), 2 other files, 1 file only in A, 1 file only in B")
+    assert lines[0].endswith("), other bytes in 2 files, 1 file only in A, 1 file only in B")
     text = "\n".join(lines)
     assert "\nfigures/still.png\n  other bytes\n\ntables/t.csv\n  other bytes\n" in text
 
@@ -552,11 +551,11 @@ def diff(capsys):
 
 
 def test_exit_statuses(diff, pair, run):
-    assert diff(*pair) == (0, "the same, byte for byte\n", "")
+    assert diff(*pair) == (0, "the same, byte for byte: 1 file\n", "")
     rewritten(pair[1], run, position=((25, 2), 7.0))
     status, out, err = diff(*pair)
     assert (status, err) == (1, "")
-    assert out.startswith("different: numbers (up to ")
+    assert out.startswith("different: numbers in 1 file (up to ")
     status, out, err = diff(*pair, "--json")
     assert (status, json.loads(out)["same"], err) == (1, False, "")
 
@@ -565,7 +564,7 @@ def test_exit_statuses(diff, pair, run):
     ("other", "told"),
     [
         ("missing.h5", "missing.h5: No such file or directory"),
-        (".", "is a folder, .* a file: allowed are two files, two folders, two archives"),
+        (".", ": a folder and a file; allowed are two files, two folders, two archives"),
         ("text.h5", "text.h5: not a readable HDF5 file"),
         ("cut.h5", "cut.h5: damaged|cut.h5: not a readable HDF5 file"),
     ],

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import csv
+import io
+
 import numpy as np
 import pytest
 
@@ -130,13 +133,18 @@ def test_files_say_of_which_versions_engines_were(limits, contact, speed, tmp_pa
 
 
 def test_limits_are_told_with_how_a_method_fails(limits):
-    told = engines.limits({"limits": limits}, "A title").markdown
-    rows = {line.split(" | ")[0].strip("| "): line for line in told.splitlines() if line.startswith("|")}
-    assert "gains energy at some phases, loses it at others" in rows["symplectic euler"]
-    assert "loses energy" in rows["implicit euler"]
-    assert "stays on the ground from" in rows["implicit euler"]
-    assert "nothing up to the end of the scan" in rows["SciPy LSODA"]
-    assert "Left out or not installed: MuJoCo, PyBullet, Drake, GNU Octave." in told
+    told = engines.limits({"limits": limits}, "A title")
+    rows = {row["method"]: row for row in csv.DictReader(io.StringIO(told.csv))}
+    ours, implicit, scipy = (rows[name] for name in ("symplectic euler", "implicit euler", "SciPy LSODA"))
+    (at_two,) = (name for name in ours if name.startswith("e at ωh = ") and float(name.split()[-1]) < 3)
+    low, high = map(float, ours[at_two].split(" … "))
+    assert low < 0.9
+    assert high > 1.1
+    assert float(implicit[at_two].split(" … ")[1]) < 0.5
+    assert scipy[at_two] == "1 … 1"
+    assert ours["leaves the ground"] == scipy["leaves the ground"] == "≥ 12"
+    assert float(implicit["leaves the ground"]) < 12
+    assert "Left out or not installed: MuJoCo, PyBullet, Drake, GNU Octave." in told.markdown
 
 
 def test_a_limit_is_the_last_before_the_first_failure():
@@ -146,11 +154,12 @@ def test_a_limit_is_the_last_before_the_first_failure():
     assert str(engines.limit_of(omega_h, np.ones(4, bool))) == "≥ 0.8"
 
 
-def test_the_table_of_contacts_says_what_is_off(contact):
-    told = engines.contact({"contact": contact}, "A title").csv.splitlines()
-    said = {(line.split(",")[0], line.split(",")[2]): line for line in told[1:]}
-    assert said["symplectic euler", "0"].endswith("nothing")
-    assert "restitution −3.1 %, falls with the step" in said["implicit euler", "0"]
+def test_the_table_of_contacts_has_what_is_off_at_each_step(contact):
+    told = csv.DictReader(io.StringIO(engines.contact({"contact": contact}, "A title").csv))
+    said = {(row["method"], row["D [kg/s]"]): row["restitution"].split(", ") for row in told}
+    assert [abs(float(part.rstrip(" %"))) < 0.1 for part in said["symplectic euler", "0"]] == [True, True]
+    shorter, longer = said["implicit euler", "0"]
+    assert (shorter, longer[:3]) == ("−3.1 %", "−15")
 
 
 def test_the_table_of_speeds_has_ratios_to_ours(speed):

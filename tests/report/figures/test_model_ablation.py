@@ -2,11 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.report.figures.drawing import drawn
 
 from stiffdice.experiments.model_ablation.measure import measure
 from stiffdice.experiments.model_ablation.time import time
-from stiffdice.report.figures import model_ablation as drawing
-from stiffdice.report.figures import style
 from stiffdice.scene.scene import Scene
 
 pytestmark = pytest.mark.long
@@ -18,16 +17,15 @@ def dataset():
 
 
 def test_errors_partings_and_spins_are_drawn_for_each_law_and_friction(dataset):
-    with style.applied():
-        panels = drawing.draw({"pieces": dataset}, "A title").axes
+    panels = drawn("model-ablation", {"pieces": dataset}).axes
     assert len(panels) == 6
     for panel in panels:
         assert "[" in panel.get_ylabel()
     for c, (left, middle, right) in enumerate(zip(*[iter(panels)] * 3, strict=True)):
-        drawn = [np.asarray(line.get_ydata()) for line in left.get_lines()]
+        errors = [np.asarray(line.get_ydata()) for line in left.get_lines()]
         for f in (1, 2):
             for a in (0, 1):
-                assert any(np.array_equal(line, dataset.landing_error[a, c, f]) for line in drawn)
+                assert any(np.array_equal(line, dataset.landing_error[a, c, f]) for line in errors)
         hollow = [line for line in left.get_lines() if line.get_markerfacecolor() == "white" and len(line.get_xdata())]
         unclear = (dataset.landing_error[:, c] <= 3 * dataset.numerical_error[c])[:, 1:].sum()
         assert sum(len(line.get_xdata()) for line in hollow) == unclear
@@ -38,8 +36,7 @@ def test_errors_partings_and_spins_are_drawn_for_each_law_and_friction(dataset):
 
 def test_times_are_drawn_as_ratios():
     timed = time(Scene().with_ground(contact="gated"), steps=300, rounds=2)
-    with style.applied():
-        (panel,) = drawing.draw_times({"gated": timed}, "A title").axes
+    (panel,) = drawn("model-ablation-time", {"gated": timed}).axes
     assert panel.get_xlabel().endswith("[1]")
     lengths = [bar.get_width() + 1 for bar in panel.patches]
     ratios = np.concatenate([timed[f"{kind}_ratio"] for kind in ("step", "run", "leap")])

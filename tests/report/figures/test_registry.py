@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.animation import FuncAnimation
 from PIL import Image
+from tests.report.figures.drawing import check_equal_files, check_units, drawn, lines_of
 
 from stiffdice.report.figures import cube, style
 from stiffdice.report.figures import registry as figures
@@ -31,12 +32,6 @@ def data(collected):
     return {"cube": throw, "posi": slide, "ener": slide, "fron": {"steps-needed": stability_limits.find(collected)}}
 
 
-def drawn(drawing, given, title="A title"):
-    """The figure, not yet a file."""
-    with style.applied():
-        return DRAWINGS[drawing].load()(given, title)
-
-
 # Those of experiments and other sweeps are tested where they are defined.
 @pytest.mark.parametrize(
     "drawing",
@@ -44,15 +39,8 @@ def drawn(drawing, given, title="A title"):
 )
 def test_each_drawing_has_units_on_its_axes_and_gives_equal_files(data, tmp_path, drawing):
     given = data[drawing[:4]]
-    for axes in drawn(drawing, given).axes:
-        outer = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
-        assert not outer or "[" in axes.get_xlabel(), axes
-        first = axes.get_subplotspec() is None or axes.get_subplotspec().is_first_col()
-        assert not first or "[" in axes.get_ylabel(), axes
-    for name in "ab":
-        figures.draw(drawing, given, "A title", 80, [str(tmp_path / f"{name}.{kind}") for kind in ("svg", "png")])
-    for kind in ("svg", "png"):
-        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    check_units(drawn(drawing, given))
+    check_equal_files(drawing, given, tmp_path)
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
     width, height = struct.unpack(">II", (tmp_path / "a.png").read_bytes()[16:24])
     assert min(width, height) > 200
@@ -101,10 +89,6 @@ def test_a_tilted_ground_is_drawn_where_it_is(data):
     axes = drawn("cube-end", run).axes[0]
     (ground,) = (part for part in axes.collections if hasattr(part, "_faces"))
     np.testing.assert_allclose(np.asarray(ground._faces).reshape(-1, 3) @ tilted["normal"], 0, atol=1e-9)
-
-
-def lines_of(axes):
-    return {line.get_label(): np.asarray(line.get_xydata()) for line in axes.get_lines()}
 
 
 def test_position_is_drawn_for_both_readings(data):

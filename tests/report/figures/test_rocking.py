@@ -2,12 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.report.figures.drawing import drawn
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.experiments import rocking
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import rocking as drawing
-from stiffdice.report.figures import style
 from stiffdice.scene.scene import Scene
 
 
@@ -18,8 +17,7 @@ def dataset():
 
 @pytest.fixture(scope="module")
 def panels(dataset):
-    with style.applied():
-        return drawing.draw({"rocking": dataset}, "A title").axes
+    return drawn("rocking", {"rocking": dataset}).axes
 
 
 def lines_of(panel):

@@ -2,17 +2,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.report.figures.drawing import check_equal_files, drawn
 
 from stiffdice.experiments.work_precision import measure as work_precision
 from stiffdice.experiments.work_precision import time as work_precision_time
 from stiffdice.experiments.work_precision.effort import STEPPING
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import method_looks, style
-from stiffdice.report.figures import registry as figures
+from stiffdice.report.figures import style
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines.registry import PEERS, SOLVERS
-from stiffdice.study import catalogue
 
 SCENE = from_mapping({"ground": {"damping": 0.1, "friction": 0.1}, "duration": 3.0}, "as_written")
 METHODS = ["symplectic_euler", *SOLVERS]
@@ -36,22 +35,13 @@ def timings():
     return {name: work_precision_time.time(SCENE, problem=problem, **options) for name, problem in problems.items()}
 
 
-def drawn(name, data):
-    with style.applied():
-        return catalogue.DRAWINGS[name].load()(data, "A title")
-
-
 def lines_of(panel):
     return {line.get_label(): line for line in panel.get_lines()}
 
 
 @pytest.mark.parametrize("name", ["work-energy", "cost"])
 def test_equal_data_give_equal_files(data, tmp_path, name):
-    for copy in "ab":
-        paths = [str(tmp_path / f"{copy}.{kind}") for kind in ("svg", "png")]
-        figures.draw(name, {"flat": data["flat"]}, "A title", 60, paths)
-    for kind in ("svg", "png"):
-        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    check_equal_files(name, {"flat": data["flat"]}, tmp_path)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -89,7 +79,7 @@ def test_the_floor_is_drawn_and_within_the_axes(data):
 
 def test_times_that_were_not_taken_are_hollow(data, timings):
     panel = drawn("work-precision", data | timings).axes[0]
-    look = method_looks.look("symplectic_euler")
+    look = style.method_look("symplectic_euler")
     marks = [
         line
         for line in panel.get_lines()
@@ -115,7 +105,7 @@ def test_the_cost_is_drawn_with_the_papers_law_beside(data):
 
 def test_every_method_has_a_look_of_its_own():
     looks = {
-        (method_looks.look(name)["color"], method_looks.look(name)["marker"])
+        (style.method_look(name)["color"], style.method_look(name)["marker"])
         for name in [*SCHEMES, *SOLVERS, *STEPPING]
     }
     assert len(looks) == len(SCHEMES) + len(SOLVERS) + len(STEPPING)

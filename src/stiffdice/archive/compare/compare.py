@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import filecmp
 import tempfile
+import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -39,29 +40,24 @@ def compare(a: Path, b: Path, all_files: bool = False) -> Comparison:
     with ExitStack() as stack:
         left, right = (_unpacked(path, stack) for path in (a, b))
         if left.is_dir() != right.is_dir():
-            one, other = (a, b) if left.is_dir() else (b, a)
-            raise InputError(f"{one} is a folder, {other} a file: allowed are two files, two folders, two archives")
+            raise InputError(f"{a}, {b}: a folder and a file; allowed are two files, two folders, two archives")
         if left.is_dir():
             return _folders(folders.read("A", left), folders.read("B", right), all_files)
         difference = _data_difference(left.name, [open_file(left)], [open_file(right)])
         identical = int(filecmp.cmp(left, right, shallow=False))
-    return Comparison(() if difference.same else (difference,), files=1, identical=identical, single=True)
+    return Comparison(() if difference.same else (difference,), files=1, identical=identical)
 
 
 def _unpacked(path: Path, stack: ExitStack) -> Path:
     """Return the path of a file or folder, of an archive that of a folder with what is in it, until the stack ends."""
-    if not path.exists():
-        raise InputError(f"{path}: No such file or directory")
     if path.is_dir():
         return path
     if not path.is_file():
-        raise InputError(f"{path}: neither a file nor a folder")
-    with path.open("rb") as file:
-        is_zip = file.read(4) in (b"PK\x03\x04", b"PK\x05\x06")
-    if not is_zip:
+        raise InputError(f"{path}: {'neither a file nor a folder' if path.exists() else 'No such file or directory'}")
+    if not zipfile.is_zipfile(path):
         isolation.admit(path)
         return path
-    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stiffdice-diff-")))
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="stiffdice-diff-")), "archive")
     unzip(path, folder)
     return folder
 
@@ -82,9 +78,9 @@ def _folders(left: Folder, right: Folder, all_files: bool) -> Comparison:
     pairs |= {name: ([name], [name]) for name in (one & other) - told}
     refused = isolation.refused(
         folder.top / name
-        for k, folder in enumerate((left, right))
         for pair in pairs.values()
-        for name in pair[k]
+        for folder, names in zip((left, right), pair, strict=True)
+        for name in names
         if name.endswith(".h5") and is_regular(folder.top / name)
     )
     found = [_difference(name, pair, (left, right), refused) for name, pair in pairs.items()]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -60,7 +61,7 @@ class Difference:
 
 def holds_runs(dataset: xr.Dataset) -> bool:
     """Return whether a dataset is a shard: runs in cells."""
-    return {"cell", "member"} <= set(dataset.sizes) and all(
+    return "member" in dataset.sizes and all(
         name in dataset.variables and dataset[name].dims == ("cell",) for name in CELL
     )
 
@@ -76,12 +77,8 @@ def runs_difference(name: str, a: Sequence[xr.Dataset], b: Sequence[xr.Dataset])
     left, right = _joined(a), _joined(b)
     _, *shared = np.intersect1d(_keys(left), _keys(right), assume_unique=True, return_indices=True)
     found = datasets_difference(name, left.isel(cell=shared[0]), right.isel(cell=shared[1]))
-    # Where a cell is in the file says nothing: cells are dealt to files in many ways.
-    values = tuple(
-        replace(part, places=tuple(replace(place, index=()) for place in part.places)) for part in found.values
-    )
     alone = [tuple(_labels(part.drop_isel(cell=at))) for part, at in zip((left, right), shared, strict=True)]
-    return replace(found, values=values, only_a=alone[0], only_b=alone[1])
+    return replace(found, only_a=alone[0], only_b=alone[1])
 
 
 def _joined(parts: Sequence[xr.Dataset]) -> xr.Dataset:
@@ -107,11 +104,10 @@ def datasets_difference(name: str, a: xr.Dataset, b: xr.Dataset) -> Difference:
         difference(left[key], right[key], partial(located, left, tuple(map(str, left[key].dims))))
         for key in left.variables
     )
-    values = tuple(variable for variable in found if variable)
     # An attribute of a variable that one of them does not have says nothing new.
-    alone = {str(key) for key in a.variables.keys() ^ b.variables.keys()}
-    said = [{key: text for key, text in _attributes(part).items() if key.split(".")[0] not in alone} for part in (a, b)]
-    return Difference(name, values, _aspects(_shapes(a), _shapes(b)), _aspects(*said), notes=notes)
+    both = [str(key) for key in a.variables.keys() & b.variables.keys()]
+    shapes, attributes = (_aspects(of(a), of(b)) for of in (_shapes, lambda dataset: dict(_attributes(dataset, both))))
+    return Difference(name, tuple(filter(None, found)), shapes, attributes, notes=notes)
 
 
 def _aspects(a: Mapping[str, Plain], b: Mapping[str, Plain]) -> tuple[Aspect, ...]:
@@ -127,29 +123,23 @@ def _shapes(dataset: xr.Dataset) -> dict[str, Plain]:
     }
 
 
-def _attributes(dataset: xr.Dataset) -> dict[str, Plain]:
-    found: dict[str, Plain] = {}
-    for above, attributes in (("", dataset.attrs), *((f"{name}.", dataset[name].attrs) for name in dataset.variables)):
+def _attributes(dataset: xr.Dataset, variables: Sequence[str]) -> Iterator[tuple[str, Plain]]:
+    """Yield the attributes of a dataset and of some variables by their names; JSON objects key by key."""
+    for above, attributes in (("", dataset.attrs), *((f"{name}.", dataset[name].attrs) for name in variables)):
         for name, value in attributes.items():
-            found |= _flat(f"{above}{name}", plain(value))
-    return found
+            content = None
+            if isinstance(value, str) and value.startswith("{"):
+                with suppress(ValueError, RecursionError):
+                    content = json.loads(value)
+            yield from _leaves(f"{above}{name}", content) if content else [(f"{above}{name}", plain(value))]
 
 
-def _flat(name: str, value: Plain) -> dict[str, Plain]:
-    """Return an attribute by its name; a JSON object key by key."""
-    try:
-        content = json.loads(value) if isinstance(value, str) and value.startswith("{") else None
-    except (ValueError, RecursionError):
-        content = None
-    return dict(_leaves(name, content)) if isinstance(content, dict) else {name: value}
-
-
-def _leaves(name: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Plain]]:
-    for key, value in content.items():
-        if isinstance(value, dict) and value:
+def _leaves(name: str, content: Any) -> Iterator[tuple[str, Plain]]:
+    if isinstance(content, dict) and content:
+        for key, value in content.items():
             yield from _leaves(f"{name}.{key}", value)
-        else:
-            yield f"{name}.{key}", json.dumps(value)
+    else:
+        yield name, json.dumps(content)
 
 
 def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset, tuple[str, ...]]:
@@ -162,15 +152,10 @@ def _shared(a: xr.Dataset, b: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset, tuple
     left, right = (part.drop_vars([name for name in part.variables if name not in shared]) for part in (a, b))
     notes = []
     for dimension in [name for name in left.sizes if left.sizes[name] != right.sizes.get(name)]:
-        if _is_labelled(left, dimension) and _is_labelled(right, dimension):
+        if all(dimension in part.indexes and part.indexes[dimension].is_unique for part in (left, right)):
             left, right = xr.align(left, right, join="inner", exclude=set(left.sizes) - {dimension})
             notes.append(f"compared at the {left.sizes[dimension]} places along {dimension} that both have")
         else:
-            along = [name for name in left.variables if dimension in left[name].dims]
-            left, right = left.drop_vars(along), right.drop_vars(along)
+            left, right = (part.drop_dims([dimension]) for part in (left, right))
             notes.append(f"not compared along {dimension}: its sizes differ, and its places have no labels")
     return left, right, tuple(notes)
-
-
-def _is_labelled(dataset: xr.Dataset, dimension: Hashable) -> bool:
-    return dimension in dataset.indexes and dataset.indexes[dimension].is_unique

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -54,19 +55,17 @@ def _is_side(path: PurePosixPath) -> bool:
 
 def _timed(top: Path, files: Iterable[str]) -> Iterator[str]:
     """Yield the figures and tables that show timings, as the file of their study says, if that is there."""
-    shown: dict[Path, set[str]] = {}
-    for name in files:
-        path = PurePosixPath(name)
+    known: dict[Path, set[str]] = {}
+    for path in map(PurePosixPath, files):
         if path.parent.name in _SHOWN:
-            study = (top / path).resolve().parent.parent
-            if study not in shown:
-                try:
+            study = (top / path.parent).resolve().parent
+            if study not in known:
+                known[study] = set()
+                with suppress(InputError):
                     plan = yaml_loader.load(study.parent.parent / "config" / f"{study.name}.yaml")
-                    shown[study] = catalogue.showing_times(plan)
-                except InputError:
-                    shown[study] = set()
-            if f"{path.parent.name}/{path.stem}" in shown[study]:
-                yield name
+                    known[study] = catalogue.showing_times(plan)
+            if f"{path.parent.name}/{path.stem}" in known[study]:
+                yield str(path)
 
 
 def _unlisted(top: Path, files: Iterable[str]) -> Iterator[str]:

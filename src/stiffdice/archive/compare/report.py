@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from stiffdice.archive.compare.datasets import Aspect, Difference
 from stiffdice.archive.compare.values import Values
 from stiffdice.errors import printable
-from stiffdice.io.content_digest import Plain
 
 # Of files, of attributes, and of variables of one file: so many are shown to people.
 SHOWN = 20
 _WIDE = 40  # characters of a text that are shown
+
+# What of files of one name may differ, by the field that says so; the gravest first.
+_KINDS = {
+    "unreadable": "data that cannot be read",
+    "values": "numbers",
+    "only_a": "cells only in A",
+    "only_b": "cells only in B",
+    "shapes": "variables, types or sizes",
+    "attributes": "attributes",
+    "other": "other bytes",
+}
 
 
 @dataclass(frozen=True)
@@ -23,8 +32,7 @@ class Comparison:
     """What differs between A and B.
 
     differences: of the files that both have and that are not the same. only_a, only_b: files that one has. left_out:
-    side files. files: how many were compared, identical: how many of them byte for byte the same. single: whether A
-    and B are files, not folders.
+    side files. files: how many were compared, identical: how many of them byte for byte the same.
     """
 
     differences: tuple[Difference, ...] = ()
@@ -33,7 +41,6 @@ class Comparison:
     left_out: tuple[str, ...] = ()
     files: int = 0
     identical: int = 0
-    single: bool = False
 
     @property
     def same(self) -> bool:
@@ -50,12 +57,9 @@ class Comparison:
         """Return what differs as text: the verdict, what explains it, then file by file, as much as one can read."""
         lines = [self.verdict, *self._about_attributes()]
         for side, names in (("A", self.only_a), ("B", self.only_b)):
-            lines += _first(f"only in {side}: {{}}".format, names, "files")
+            lines += _first([f"only in {side}: {name}" for name in names], "files")
         for part in self.differences[:SHOWN]:
-            about = list(_about(part))
-            if self.single:
-                lines += about
-            elif about:
+            if about := list(_about(part)):
                 lines += ["", part.name, *(f"  {line}" for line in about)]
         lines += _more(len(self.differences) - SHOWN, "files")
         if self.left_out:
@@ -69,46 +73,27 @@ class Comparison:
         if not self.same:
             different = f"different: {', '.join(self._how_different())}"
             return f"the numbers are the same; {different}" if self.numbers_same else different
+        files = _count(self.files, "file")
         if self.identical == self.files:
-            return "the same, byte for byte" + ("" if self.single else f": {_count(self.files, 'file')}")
-        how = "" if self.single else f": {_count(self.files, 'file')}, {self.identical} of them byte for byte"
-        return f"the same numbers and attributes, stored otherwise{how}"
+            return f"the same, byte for byte: {files}"
+        return f"the same numbers and attributes, stored otherwise: {files}, {self.identical} of them byte for byte"
 
     def _how_different(self) -> Iterator[str]:
-        """Yield what differs, the gravest first."""
-        parts = self.differences
-        unreadable = sum(len(part.unreadable) for part in parts)
-        if unreadable:
-            yield f"{_count(unreadable, 'file')} that cannot be read"
-        if any(part.values for part in parts):
-            yield self._in("numbers", (part.values for part in parts)) + _up_to(parts)
-        for side, cells in (("A", [part.only_a for part in parts]), ("B", [part.only_b for part in parts])):
-            if any(cells):
-                yield f"{_count(sum(map(len, cells)), 'cell')} only in {side}"
-        if any(part.shapes for part in parts):
-            yield self._in("variables, types or sizes", (part.shapes for part in parts))
-        if any(part.attributes for part in parts):
-            yield self._in("attributes", (part.attributes for part in parts))
-        others = sum(part.other for part in parts)
-        if others:
-            yield _count(others, "other file")
+        """Yield what differs, the gravest first, and in how many files."""
+        for field, what in _KINDS.items():
+            number = sum(bool(getattr(part, field)) for part in self.differences)
+            if number:
+                yield f"{what} in {_count(number, 'file')}{_up_to(self.differences) if field == 'values' else ''}"
         for side, names in (("A", self.only_a), ("B", self.only_b)):
             if names:
                 yield f"{_count(len(names), 'file')} only in {side}"
-
-    def _in(self, what: str, found: Iterable[Sequence[object]]) -> str:
-        return what if self.single else f"{what} in {_count(sum(map(bool, found)), 'file')}"
 
     def _about_attributes(self) -> list[str]:
         """Return which attributes differ, each once for all files that it does in: what made them explains the rest."""
         found = Counter(aspect for part in self.differences for aspect in part.attributes)
         # What only one of the two says is often only newer.
-        ordered = sorted(found, key=lambda aspect: (None in (aspect.a, aspect.b), -found[aspect]))
-        return _first(
-            lambda one: f"{one.name}: {_against(one)}" + ("" if self.single else f" ({_count(found[one], 'file')})"),
-            ordered,
-            "attributes",
-        )
+        ordered = sorted(found.items(), key=lambda item: (None in (item[0].a, item[0].b), -item[1]))
+        return _first([f"{_against(one)} ({_count(count, 'file')})" for one, count in ordered], "attributes")
 
     def as_json(self) -> str:
         """Return all of it as JSON, with text for the numbers that JSON does not have."""
@@ -124,8 +109,8 @@ def _more(number: int, what: str) -> list[str]:
     return [f"… and {number} more {what}"] if number > 0 else []
 
 
-def _first(shown: Callable[[Any], str], found: Sequence[Any], what: str) -> list[str]:
-    return [*map(shown, found[:SHOWN]), *_more(len(found) - SHOWN, what)]
+def _first(lines: Sequence[str], what: str) -> list[str]:
+    return [*lines[:SHOWN], *_more(len(lines) - SHOWN, what)]
 
 
 def _up_to(parts: Sequence[Difference]) -> str:
@@ -133,13 +118,12 @@ def _up_to(parts: Sequence[Difference]) -> str:
     values = [one for part in parts for one in part.values if one.ulp is not None]
     if not values:
         return ""
-    share = max(one.relative or 0.0 for one in values)
-    return f" (up to {_many(max(one.ulp or 0 for one in values))} ulp, {share:.2g} of the value)"
+    return f" (up to {_relative(*(max(getattr(one, name) for one in values) for name in ('ulp', 'relative')))})"
 
 
-def _many(number: float) -> str:
-    """Return a whole number as people read it."""
-    return str(number) if number < 1_000_000 else f"{number:.2g}"
+def _relative(ulp: int, relative: float | None) -> str:
+    number = str(ulp) if ulp < 1_000_000 else f"{ulp:.2g}"
+    return f"{number} ulp, {relative:.2g} of the value"
 
 
 def _about(part: Difference) -> Iterator[str]:
@@ -151,39 +135,30 @@ def _about(part: Difference) -> Iterator[str]:
     for values in part.values[:SHOWN]:
         yield from _about_values(values)
     yield from _more(len(part.values) - SHOWN, "variables")
-    yield from _first(lambda aspect: f"{aspect.name}: {_against(aspect)}", part.shapes, "variables")
+    yield from _first(list(map(_against, part.shapes)), "variables")
     if part.other:
-        yield "other bytes"
+        yield _KINDS["other"]
     yield from part.notes
 
 
 def _about_values(values: Values) -> Iterator[str]:
-    units = "" if values.units == "1" else f" {values.units}"
-    sizes = [
-        *([] if values.ulp is None else [f"{_many(values.ulp)} ulp"]),
-        *([] if values.relative is None else [f"{values.relative:.2g} of the value"]),
-        *([] if values.absolute is None else [f"{values.absolute:.3g}{units}"]),
-    ]
+    sizes = [] if values.ulp is None else [_relative(values.ulp, values.relative)]
+    if values.absolute is not None:
+        sizes.append(f"{values.absolute:.3g}" + ("" if values.units == "1" else f" {values.units}"))
     if values.of == 1:
-        place = values.places[0]
-        yield f"{values.variable}: {', '.join([f'{place.a} against {place.b}', *sizes])}"
+        yield ", ".join([f"{values.variable}: {values.places[0].a} against {values.places[0].b}", *sizes])
         return
     size = f", by up to {', '.join(sizes)}" if sizes else ""
     unmeasured = f" ({values.unmeasured} NaN or infinite)" if values.unmeasured else ""
     yield f"{values.variable}: {values.count} of {_count(values.of, 'value')} differ{size}{unmeasured}"
-    yield from _first("  {}".format, values.changes, "changes")
+    yield from _first([f"  {change}" for change in values.changes], "changes")
     for place in values.places:
-        index = f" [{', '.join(map(str, place.index))}]" if place.index else ""
-        yield f"  {place.where}{index}: {place.a} against {place.b}"
+        yield f"  {place.where}: {place.a} against {place.b}"
 
 
 def _against(aspect: Aspect) -> str:
-    """Return two values shortly."""
+    """Return what two files say, shortly."""
+    a, b = (text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…" for text in (str(aspect.a), str(aspect.b)))
     if aspect.a is None or aspect.b is None:
-        return f"only in {'B' if aspect.a is None else 'A'}: {_short(aspect.b if aspect.a is None else aspect.a)}"
-    return f"{_short(aspect.a)} against {_short(aspect.b)}"
-
-
-def _short(value: Plain | None) -> str:
-    text = str(value)
-    return text if len(text) <= _WIDE else f"{text[: _WIDE - 1]}…"
+        return f"{aspect.name}: only in {'B' if aspect.a is None else 'A'}: {b if aspect.a is None else a}"
+    return f"{aspect.name}: {a} against {b}"

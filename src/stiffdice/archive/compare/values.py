@@ -19,10 +19,9 @@ Index = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Place:
-    """One value that differs: where it is (`first at time = 2 s`), in words and as an index; both values, exactly."""
+    """One value that differs: where it is, such as `first at time = 2 s, axis z`; both values, exactly."""
 
     where: str
-    index: Index
     a: str
     b: str
 
@@ -33,8 +32,8 @@ class Values:
 
     count: how many of `of`. places: the first, and the one of the largest difference. unmeasured: those of which one is
     NaN or infinite. Of the others the largest difference in ulp [1], relative [1] to the larger of the two magnitudes,
-    and absolute [units]; of whole numbers the last alone, of enums and text none. changes: of an enum, how many changed
-    from which word to which.
+    and absolute [units]; of whole numbers the last alone, of enums none. changes: of an enum, how many changed from
+    which word to which.
     """
 
     variable: str
@@ -50,39 +49,32 @@ class Values:
 
 
 def difference(a: xr.DataArray, b: xr.DataArray, where: Callable[[Index], str]) -> Values | None:
-    """Return how two variables of one name and shape differ; None if they do not.
+    """Return how two variables of numbers, of one name and shape, differ; None if they do not.
 
     where: says in words where an index is. NaN equals NaN; 0.0 and -0.0 differ, by 0 ulp.
     """
     x, y = a.values, b.values
-    kinds = {x.dtype.kind, y.dtype.kind}
-    is_number = kinds <= set("fiub") and "flag_meanings" not in a.attrs
     differ = np.asarray(x != y)
-    if is_number and "f" in kinds:
+    if "f" in x.dtype.kind + y.dtype.kind:
         differ = (differ | (np.signbit(x) != np.signbit(y))) & ~(np.isnan(x) & np.isnan(y))
     if not differ.any():
         return None
-    count, first = int(differ.sum()), _first(differ)
-    measured = differ & np.isfinite(x) & np.isfinite(y) if is_number else np.zeros_like(differ)
-    largest, amounts = _largest(x, y, measured) if measured.any() else (first, {})
-    titles = {first: "first "}
-    if amounts:
-        titles[largest] = "first and largest " if largest == first else "largest "
-    if count == 1:
-        titles[first] = ""
-    return Values(
-        str(a.name),
-        str(a.attrs.get("units", "1")),
-        differ.size,
-        count,
-        tuple(
-            Place(f"{title}at {where(index)}", index, text(a, x[index]), text(b, y[index]))
-            for index, title in titles.items()
-        ),
-        unmeasured=count - int(measured.sum()) if is_number else 0,
-        changes=_changes(a, b, differ),
-        **amounts,
+    count, titles, amounts = int(differ.sum()), {_first(differ): "first "}, dict[str, Any]()
+    if "flag_meanings" in a.attrs:
+        found = Counter(zip(_words(a, x[differ]), _words(b, y[differ]), strict=True))
+        amounts["changes"] = tuple(f"{number} from {one} to {other}" for (one, other), number in found.most_common())
+    else:
+        measured = differ & np.isfinite(x) & np.isfinite(y)
+        amounts["unmeasured"] = count - int(measured.sum())
+        if measured.any():
+            largest, sizes = _largest(x, y, measured)
+            titles[largest] = f"{titles.get(largest, '')}{'and ' if largest in titles else ''}largest "
+            amounts |= sizes
+    places = tuple(
+        Place(f"{title if count > 1 else ''}at {where(index)}", *_words(a, x[index]), *_words(b, y[index]))
+        for index, title in titles.items()
     )
+    return Values(str(a.name), str(a.attrs.get("units", "1")), differ.size, count, places, **amounts)
 
 
 def _first(flags: npt.NDArray[np.bool_]) -> Index:
@@ -111,8 +103,8 @@ def ulps(a: npt.NDArray[np.floating[Any]], b: npt.NDArray[np.floating[Any]]) -> 
     2⁻⁵³, and from zero 5e-324. Steps are counted through zero and the subnormal numbers; -0.0 is where 0.0 is. From
     the largest double to infinity is one.
 
-    a, b: of one type (float16, float32 or float64) and shape, without NaN. Floating-point numbers of one sign are in
-    the order of their bits read as whole numbers (IEEE 754), which is what makes them countable.
+    a, b: of one type (float16, float32 or float64, in this machine's byte order) and shape, without NaN. Floating-point
+    numbers of one sign are in the order of their bits read as whole numbers (IEEE 754), which makes them countable.
     """
     places_a, places_b = _places(a), _places(b)
     # Modulo 2⁶⁴ the difference is right even where it is beyond int64.
@@ -122,30 +114,14 @@ def ulps(a: npt.NDArray[np.floating[Any]], b: npt.NDArray[np.floating[Any]]) -> 
 
 def _places(values: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.int64]:
     """Return the place of each number in the row of all of its type, both zeros at 0."""
-    native = np.ascontiguousarray(values, values.dtype.newbyteorder("=")).reshape(np.shape(values))
-    whole = np.dtype(f"i{native.dtype.itemsize}")
-    bits = native.view(whole)
-    lowest = np.iinfo(whole).min
-    return np.where(bits < 0, lowest - bits, bits).astype(np.int64)
+    bits = values.view(f"i{values.itemsize}")
+    return np.where(bits < 0, np.iinfo(bits.dtype).min - bits, bits).astype(np.int64)
 
 
-def _changes(a: xr.DataArray, b: xr.DataArray, differ: npt.NDArray[np.bool_]) -> tuple[str, ...]:
-    """Return how many values of an enum changed from which word to which, the most first."""
-    if "flag_meanings" not in a.attrs:
-        return ()
-    found = Counter(zip(a.values[differ].tolist(), b.values[differ].tolist(), strict=True))
-    return tuple(
-        f"{number} from {text(a, np.int8(one))} to {text(b, np.int8(other))}"
-        for (one, other), number in found.most_common()
-    )
-
-
-def text(variable: xr.DataArray, value: Any) -> str:
-    """Return a value exactly: an enum by its meaning, a number by its shortest digits."""
-    if "flag_meanings" in variable.attrs and isinstance(value, np.integer):
-        meanings = meanings_of(variable)
-        return meanings[int(value)] if 0 <= int(value) < len(meanings) else str(value)
-    return repr(value.item()) if isinstance(value, np.generic) else repr(value)
+def _words(variable: xr.DataArray, values: npt.ArrayLike) -> list[str]:
+    """Return values exactly: those of an enum by their meanings, numbers by their shortest digits."""
+    numbers = np.ravel(values).tolist()
+    return list(map(meanings_of(variable).__getitem__ if "flag_meanings" in variable.attrs else repr, numbers))
 
 
 def located(dataset: xr.Dataset, dimensions: Sequence[str], index: Index) -> str:
@@ -154,23 +130,18 @@ def located(dataset: xr.Dataset, dimensions: Sequence[str], index: Index) -> str
 
 
 def _at(dataset: xr.Dataset, dimension: str, k: int) -> str:
-    """Return one place along a dimension: `axis z`, `member 3`, `time = 1.25 s`, `gated, stiffness = 10 kg s-2`."""
+    """Return one place along a dimension: `axis z`, `member = 3`, `contact gated, stiffness = 10 kg s-2`."""
     if dimension in dataset.variables:
-        labels = dataset[dimension]
-        if "flag_meanings" in labels.attrs or (labels.dtype.kind in "iu" and labels.attrs.get("units") == "1"):
-            return f"{dimension} {text(labels, labels.values[k])}"
-        return _label(labels, k)
-    if dimension == "cell" and all(name in dataset.variables for name in CELL):
-        return ", ".join(_label(dataset[name], k) for name in CELL)
-    told = ", ".join(_label(labels, k) for labels in dataset.coords.values() if labels.dims == (dimension,))
-    return f"{dimension} {k}" + (f" ({told})" if told else "")
+        return _label(dataset[dimension], k)
+    along = {str(name): labels for name, labels in dataset.coords.items() if labels.dims == (dimension,)}
+    shown = [along[name] for name in CELL if name in along] or along.values()
+    return ", ".join(_label(labels, k) for labels in shown) or f"{dimension} {k}"
 
 
 def _label(labels: xr.DataArray, k: int) -> str:
-    """Return one value of a coordinate: `gated`, `steps = 812`, `stiffness = 1000 kg s-2`."""
-    value = labels.values[k]
+    (word,) = _words(labels, labels.values[k])
     if "flag_meanings" in labels.attrs:
-        return text(labels, value)
-    number = f"{value:.10g}" if labels.dtype.kind == "f" else str(value)
+        return f"{labels.name} {word}"
     units = str(labels.attrs.get("units", "1"))
+    number = f"{labels.values[k]:.10g}" if labels.dtype.kind == "f" else word
     return f"{labels.name} = {number}" + ("" if units == "1" else f" {units}")

@@ -51,5 +51,4 @@ def problems(dataset: xr.Dataset) -> list[str]:
     except InputError as error:
         return [str(error)]
     except Exception as error:  # whatever a file that is not ours makes of what looks at it
-        reason = str(error).splitlines()[0] if str(error) else "nothing more is known"
-        return [f"cannot be checked as a {kind}: {type(error).__name__}: {reason}"]
+        return [f"cannot be checked as a {kind}: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"]

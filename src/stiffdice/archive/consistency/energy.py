@@ -6,7 +6,6 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.archive.consistency.tolerance import ROUNDING, outside, unequal
-from stiffdice.dynamics.state import Array
 from stiffdice.simulation import energy_budget
 
 _DEFECTS = ("spring_defect", "gravity_defect", "kick_defect")
@@ -22,28 +21,25 @@ def problems(dataset: xr.Dataset, steps: int, duration: float, highest: float) -
     count = int(dataset["bounce_count"])
     found = outside("bounce_count", count, rows == min(count, energy_budget.LARGEST), f"{rows}, the rows of the ledger")
     found += _rows(dataset, steps, duration)
-    peaks = dataset["bounce_largest_elastic_energy"].values
+    for prefix in ("", "flight_", "bounce_"):
+        parts = [dataset[prefix + name].values for name in _DEFECTS]
+        roundings = 2 * ROUNDING * sum(map(np.abs, parts))
+        work = f"{prefix}scheme_work"
+        found += unequal(work, dataset[work].values, sum(parts), roundings, "its three defects")
     # Twelve roundings of energies in every step, which the compensated sums then keep.
-    step = 12 * ROUNDING * (highest + float(np.max(peaks, initial=0.0)))
-    for prefix, spans in (("", steps), ("flight_", steps), ("bounce_", _lengths(dataset))):
-        found += _defects(dataset, prefix)
-        if prefix == "bounce_":
-            change = dataset["bounce_energy_after"].values - dataset["bounce_energy_before"].values
-        elif prefix == "":
-            change = dataset["end_energy"].values - dataset["launch_energy"].values
-        else:
-            continue
+    step = 12 * ROUNDING * (highest + float(np.max(dataset["bounce_largest_elastic_energy"].values, initial=0.0)))
+    spans = dataset["bounce_last_step"].values - dataset["bounce_first_step"].values
+    for prefix, before, after, steps_of in (
+        ("", "launch_energy", "end_energy", np.asarray(steps)),
+        ("bounce_", "bounce_energy_before", "bounce_energy_after", spans),
+    ):
         booked = [dataset[prefix + name].values for name in _WORKS]
-        room = np.asarray(spans) * (step + 2 * ROUNDING * sum(np.abs(work) for work in booked))
+        room = steps_of * (step + 2 * ROUNDING * sum(map(np.abs, booked)))
+        change = dataset[after].values - dataset[before].values
         found += unequal(f"sum of {prefix}works", sum(booked), change, room, "the change of the energy")
     if count <= energy_budget.LARGEST:
         found += _parts(dataset, steps)
     return found
-
-
-def _lengths(dataset: xr.Dataset) -> Array:
-    """Return of how many steps each bounce is."""
-    return np.asarray(dataset["bounce_last_step"].values - dataset["bounce_first_step"].values, np.float64)
 
 
 def _rows(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
@@ -55,14 +51,6 @@ def _rows(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
         right = step / steps * duration
         found += unequal(name, dataset[name].values, right, 2 * ROUNDING * right, "step / steps * duration")
     return found
-
-
-def _defects(dataset: xr.Dataset, prefix: str) -> list[str]:
-    parts = [dataset[prefix + name].values for name in _DEFECTS]
-    room = 2 * ROUNDING * sum(np.abs(part) for part in parts)
-    return unequal(
-        f"{prefix}scheme_work", dataset[f"{prefix}scheme_work"].values, sum(parts), room, "its three defects"
-    )
 
 
 def _parts(dataset: xr.Dataset, steps: int) -> list[str]:

@@ -11,7 +11,8 @@ from stiffdice.archive.consistency import energy as books
 from stiffdice.archive.consistency import verdicts
 from stiffdice.archive.consistency.tolerance import ROUNDING, outside, unequal
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import TURNING, Array, Physics, physics_of, start_of
+from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.state import TURNING, physics_of, start_of
 from stiffdice.scene import scene as scenes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.criteria.registry import CRITERIA
@@ -53,45 +54,26 @@ def _counts(dataset: xr.Dataset, scene: Scene) -> list[str]:
     return found + unequal("time", dataset["time"].values, right, 2 * ROUNDING * right, "step / steps * duration")
 
 
-def _turns(dataset: xr.Dataset) -> bool:
-    return str(dataset.attrs["model"]) in TURNING
-
-
 def _energies(dataset: xr.Dataset, scene: Scene) -> list[str]:
-    """State by state, from velocities and places, to the rounding of their sums; a depth is a difference."""
-    physics = physics_of(scene)
-    kinetic, potential, elastic, both = (
-        dataset[name].values for name in ("kinetic_energy", "potential_energy", "elastic_energy", "energy_paper")
-    )
-    moving = 0.5 * physics.mass * _squares(dataset["velocity"].values)
-    if _turns(dataset):
-        moving = moving + 0.5 * _squares(dataset["angular_momentum"].values) / physics.inertia
-    high = physics.mass * physics.gravity * dataset["position"].values[:, 2]
-    depth, blur = _depths(dataset, scene, physics)
-    pressed = 0.5 * physics.stiffness * (np.maximum(0.0, depth) ** 2).sum(axis=1)
-    room = (physics.stiffness * blur * np.maximum(0.0, depth + blur)).sum(axis=1) + 16 * ROUNDING * pressed
-    return [
-        *unequal("kinetic_energy", kinetic, moving, 8 * ROUNDING * moving, "m u²/2 + L²/(2 I)"),
-        *unequal("potential_energy", potential, high, 4 * ROUNDING * np.abs(high), "m g z"),
-        *unequal("elastic_energy", elastic, pressed, room, "the sum of S d²/2 over the nodes"),
-        *unequal("energy_paper", both, kinetic + potential, 0.0, "kinetic_energy + potential_energy"),
-    ]
+    """State by state, from velocities and places, to the rounding of their sums.
 
-
-def _squares(vectors: Array) -> Array:
-    return np.asarray(vectors[:, 0] ** 2 + vectors[:, 1] ** 2 + vectors[:, 2] ** 2)
-
-
-def _depths(dataset: xr.Dataset, scene: Scene, physics: Physics) -> tuple[Array, Array]:
-    """Return how deep each node is in the ground [m], shape (time, node), and how much of it may be rounding.
-
-    That is of six products and five sums, and of turning the nodes; shape (time, 1).
+    A depth d of the 8 nodes is off by up to b, the rounding of six products, five sums and of turning the nodes; so the
+    sum of S d²/2 is by up to 4 b √(S ΣS d²/2) + 4 S b², by the inequality of Cauchy and Schwarz.
     """
-    n, x = np.array(scene.ground.normal), dataset["position"].values
-    start = start_of(scene, str(dataset.attrs["model"]))[0]
-    r = dataset["node_offset"].values if _turns(dataset) else start["node_offset"][None]
-    blur = 16 * ROUNDING * (np.abs(x) @ np.abs(n) + 2 * physics.reach)
-    return -((x @ n)[:, None] + r @ n), blur[:, None]
+    physics, model = physics_of(scene), str(dataset.attrs["model"])
+    states = np.repeat(start_of(scene, model), dataset.sizes["time"])
+    for name in ("position", "velocity", *(("angular_momentum", "node_offset") if model in TURNING else ())):
+        states[name] = dataset[name].values
+    kinetic, potential, elastic = energies(physics, states)
+    blur = 16 * ROUNDING * (np.abs(states["position"]) @ np.abs(scene.ground.normal) + 2 * physics.reach)
+    room = 4 * blur * np.sqrt(physics.stiffness * elastic) + 4 * physics.stiffness * blur**2 + 16 * ROUNDING * elastic
+    paper = dataset["kinetic_energy"].values + dataset["potential_energy"].values
+    return [
+        *unequal("kinetic_energy", dataset["kinetic_energy"], kinetic, 8 * ROUNDING * kinetic, "m u²/2 + L²/(2 I)"),
+        *unequal("potential_energy", dataset["potential_energy"], potential, 4 * ROUNDING * np.abs(potential), "m g z"),
+        *unequal("elastic_energy", dataset["elastic_energy"], elastic, room, "the sum of S d²/2 over the nodes"),
+        *unequal("energy_paper", dataset["energy_paper"], paper, 0.0, "kinetic_energy + potential_energy"),
+    ]
 
 
 # Of one rotation of the nodes: the rounding of its axis, of sine and cosine, of the matrix, and of three products.
@@ -103,7 +85,7 @@ def _rigid(dataset: xr.Dataset, scene: Scene) -> list[str]:
 
     A turn needs a force, so there are not more of them than evaluations, or than steps of free flight.
     """
-    if not _turns(dataset):
+    if str(dataset.attrs["model"]) not in TURNING:
         return []
     nodes, offsets = scene.cube.node_offsets(), dataset["node_offset"].values
     first, second = np.triu_indices(len(nodes), 1)

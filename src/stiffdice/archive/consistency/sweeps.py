@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +47,6 @@ def of_cells(dataset: xr.Dataset) -> list[str]:
 # Of the logarithms (base 10) through which a power law goes: a hundred terms of a size up to 20, twice rounded.
 _FIT_ROUNDING = 100 * 20 * 2 * ROUNDING
 
-
 # What a file and the one that it is made from say alike.
 _SHARED = (
     *("scene_digest", "model", "scheme", "simulator", "simulator_version", "code_digest", "early_stop"),
@@ -55,27 +55,26 @@ _SHARED = (
 
 
 def same_as_collected(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
-    """Return a line for all that a sweep says otherwise than its shards, which it does to the last bit."""
+    """Return a line for all that a sweep says otherwise than its shards, which it does to the last bit.
+
+    Of the runs no more is asked than of the sweep.
+    """
+    whole, runs = (json.loads(str(found.attrs.get("config", "{}"))) for found in (dataset, again))
+    config = _said_otherwise(whole, runs, runs, "config.", "its shards")
     return (
-        _attributes(dataset, again, "its shards", _SHARED) + _config(dataset, again) + _differences(dataset, again, {})
+        _said_otherwise(dataset.attrs, again.attrs, _SHARED, "", "its shards")
+        + config
+        + _differences(dataset, again, {})
     )
 
 
-def _config(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
-    """Return a line for all that was asked of the runs otherwise than of the sweep, which asks more."""
-    whole, runs = (json.loads(str(found.attrs.get("config", "{}"))) for found in (dataset, again))
+def _said_otherwise(
+    said: Mapping[str, Any], right: Mapping[str, Any], names: Iterable[str], above: str, whose: str
+) -> list[str]:
     return [
-        f"config.{key} = {whole.get(key)}: allowed is {value}, that of its shards"
-        for key, value in runs.items()
-        if whole.get(key) != value
-    ]
-
-
-def _attributes(dataset: xr.Dataset, other: xr.Dataset, whose: str, names: Sequence[str]) -> list[str]:
-    return [
-        f"{name} = {dataset.attrs.get(name)}: allowed is {other.attrs.get(name)}, that of {whose}"
+        f"{above}{name} = {said.get(name)}: allowed is {right.get(name)}, that of {whose}"
         for name in names
-        if str(dataset.attrs.get(name)) != str(other.attrs.get(name))
+        if str(said.get(name)) != str(right.get(name))
     ]
 
 
@@ -91,20 +90,20 @@ def same_as_found(dataset: xr.Dataset, collected: xr.Dataset) -> list[str]:
         rooms[name] = np.log(10) * _FIT_ROUNDING * np.abs(again[name].values)
     for name in ("limit", "pass_fraction_low", "pass_fraction_high"):
         rooms[name] = 16 * ROUNDING * np.abs(again[name].values) + 4 * ROUNDING
-    shared = (*_SHARED, "config_digest")
-    return _attributes(dataset, collected, "its sweep", shared) + _differences(dataset, again, rooms)
+    said = _said_otherwise(dataset.attrs, collected.attrs, (*_SHARED, "config_digest"), "", "its sweep")
+    return said + _differences(dataset, again, rooms)
 
 
-def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: dict[str, npt.ArrayLike]) -> list[str]:
+def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: Mapping[str, npt.ArrayLike]) -> list[str]:
     found = []
-    for key, right in again.variables.items():
-        name = str(key)
-        if name not in dataset.variables:
+    for name, right in again.variables.items():
+        given = dataset.variables.get(name)
+        if given is None:
             found.append(f"{name}: is missing")
-        elif dataset[name].dims != right.dims or dataset[name].shape != right.shape:
-            found.append(f"{name}{dict(dataset[name].sizes)}: allowed is {dict(right.sizes)}")
-        elif dataset[name].attrs.get("flag_meanings") != right.attrs.get("flag_meanings"):
+        elif given.sizes != right.sizes or given.dims != right.dims:
+            found.append(f"{name}{dict(given.sizes)}: allowed is {dict(right.sizes)}")
+        elif given.attrs.get("flag_meanings") != right.attrs.get("flag_meanings"):
             found.append(f"{name}: flag_meanings: allowed are {right.attrs.get('flag_meanings')}")
         else:
-            found += unequal(name, dataset[name].values, right.values, rooms.get(name, 0.0), "computed again")
+            found += unequal(str(name), given.values, right.values, rooms.get(str(name), 0.0), "computed again")
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,30 +21,21 @@ def unequal(name: str, found: npt.ArrayLike, right: npt.ArrayLike, room: npt.Arr
     """
     a, b = np.broadcast_arrays(np.asarray(found, np.float64), np.asarray(right, np.float64))
     same = (a == b) | (np.isnan(a) & np.isnan(b)) | (np.abs(a - b) <= np.asarray(room) + TINY)
-    if same.all():
-        return []
-    wrong = np.argwhere(~same)
-    k = tuple(int(index) for index in wrong[0])
-    return [f"{name}{_place(k)} = {a[k]:.17g}: allowed is {b[k]:.17g}, {why}{_more(len(wrong), a.size)}"]
+    return _line(name, a, same, lambda k: f"{b[k]:.17g}, {why}")
 
 
 def outside(name: str, found: npt.ArrayLike, fine: npt.ArrayLike, allowed: str) -> list[str]:
     """Return a line if values are not what is allowed; fine: where they are, of the same shape."""
-    given, good = np.broadcast_arrays(np.asarray(found), np.asarray(fine))
-    if good.all():
+    given, good = np.broadcast_arrays(found, fine)
+    return _line(name, given, good, lambda k: allowed)
+
+
+def _line(name: str, found: npt.NDArray[Any], fine: npt.NDArray[Any], allowed: Callable[[Any], str]) -> list[str]:
+    """Return what is told of the first value that is not fine; allowed: at an index."""
+    if fine.all():
         return []
-    wrong = np.argwhere(~good)
-    k = tuple(int(index) for index in wrong[0])
-    return [f"{name}{_place(k)} = {_shown(given[k])}: allowed is {allowed}{_more(len(wrong), good.size)}"]
-
-
-def _place(index: tuple[int, ...]) -> str:
-    return f"[{', '.join(map(str, index))}]" if index else ""
-
-
-def _more(count: int, of: int) -> str:
-    return f" ({count} of {of} values)" if of > 1 else ""
-
-
-def _shown(value: Any) -> str:
-    return f"{value:.17g}" if isinstance(value, np.floating) else str(value)
+    wrong = np.argwhere(~fine)
+    k = tuple(wrong[0].tolist())
+    value = f"{found[k]:.17g}" if found.dtype.kind == "f" else str(found[k])
+    more = f" ({len(wrong)} of {found.size} values)" if found.size > 1 else ""
+    return [f"{name}{list(k) if k else ''} = {value}: allowed is {allowed(k)}{more}"]

@@ -30,18 +30,13 @@ _LOOKS: dict[str, dict[str, Any]] = {
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the map of energy gains above, and the largest and smallest over the phases below.
-
-    experiments: one, as `experiments.bounce_map.measure` makes it.
-    """
+    """Return the map of energy gains above, and the largest and smallest over the phases below."""
     (dataset,) = experiments.values()
     figure = style.new_figure(title, width=8.6, height=8.2)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1, 1.25))
     _map(figure, upper, dataset)
     _extremes(lower, dataset)
-    scan = dataset.omega_h.values
-    lower.set_xlim(scan[0], scan[-1])
-    lower.set_xlabel(style.OMEGA_H)
+    lower.set(xlim=dataset.omega_h.values[[0, -1]], xlabel=style.OMEGA_H)
     lower.xaxis.set_major_formatter("{x:g}")
     scene = scene_of(dataset)
     note = (
@@ -58,7 +53,7 @@ def _map(figure: Figure, panel: Any, dataset: xr.Dataset) -> None:
     phase = np.append(dataset.phase.values, 1.0)
     gain = np.vstack([dataset.energy_gain.values.T, dataset.energy_gain.values[:, 0]])
     scan = dataset.omega_h.values
-    panel.set_xscale("log")
+    panel.set(xscale="log", ylim=(0.0, 1.0), ylabel="phase of the step at touch-down [1]")
     drawn = panel.pcolormesh(
         style.borders(scan, logarithmic=True),
         style.borders(phase),
@@ -68,8 +63,6 @@ def _map(figure: Figure, panel: Any, dataset: xr.Dataset) -> None:
         rasterized=True,
     )
     panel.grid(visible=False)
-    panel.set_ylim(0.0, 1.0)
-    panel.set_ylabel("phase of the step at touch-down [1]")
     magic = linear_theory.magic_steps(scan[0], scan[-1])
     top = style.top_axis(panel, list(magic.values()), [str(n) if n <= _NUMBERED else "" for n in magic])
     panel.set_title("A bounce gains or loses energy by where in a step it meets the ground, but for the magic steps")
@@ -83,7 +76,8 @@ def _map(figure: Figure, panel: Any, dataset: xr.Dataset) -> None:
 
 
 def _extremes(panel: Any, dataset: xr.Dataset) -> None:
-    panel.set(xscale="log", yscale="log")
+    # Between what gravity leaves and round-off there is nothing to hide.
+    panel.set(xscale="log", yscale="log", ylim=(1e-15, 1e2), ylabel="largest |e²−1| over the phases [1]")
     scan = dataset.omega_h.values
     fine = np.geomspace(scan[0], scan[-1], int(_FINE * np.log10(scan[-1] / scan[0])))
     peak = np.array([linear_theory.largest_gain(value) for value in fine])
@@ -100,8 +94,5 @@ def _extremes(panel: Any, dataset: xr.Dataset) -> None:
     weighed = dataset.largest_with_gravity.values[magic]
     panel.plot(scan[magic], weighed, linestyle="none", label="at a magic step with gravity", **_LOOKS["gravity"])
     panel.plot(scan, dataset.gravity_theory, ":", color=style.GREEN, linewidth=1.0, label="theory: 2gh/v")
-    panel.set_ylabel("largest |e²−1| over the phases [1]")
     panel.set_title("Up to the bound, but nothing at a magic step: only gravity is left, and round-off without it")
-    # Between what gravity leaves and round-off there is nothing to hide.
-    panel.set_ylim(1e-15, 1e2)
     panel.legend(loc="center", bbox_to_anchor=(0.5, 0.34), ncols=2)

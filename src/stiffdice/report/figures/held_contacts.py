@@ -18,7 +18,7 @@ from stiffdice.report.number_format import ground_words
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return a column for each friction: above the error, below the force evaluations, a line for each stiffness.
 
-    experiments: one, as `experiments.held.measure` makes it. Lines are medians over the launches, dots the worst.
+    Lines are medians over the launches, dots the worst.
     """
     (dataset,) = experiments.values()
     count = dataset.sizes["friction"]
@@ -39,11 +39,9 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     rows[0, 0].set_ylabel("error of the position [r]")
     rows[1, 0].set_ylabel("force evaluations [1]")
     rows[0, 0].invert_xaxis()
+    grounds = [ground_words(stiffness=value) for value in dataset.stiffness.values.tolist()]
     handles = [
-        style.line(ground_words(stiffness=float(value)), color=color)
-        for color, value in zip(colors, dataset.stiffness.values, strict=True)
-    ]
-    handles += [
+        *(style.line(words, color=color) for words, color in zip(grounds, colors, strict=True)),
         style.mark("worst launch", ".", color=style.INK),
         style.line("the tolerance itself", **style.THEORY),
         style.line("LSODA from LSODA", color=style.QUIET, linestyle=":"),

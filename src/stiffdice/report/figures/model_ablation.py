@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from stiffdice.report.number_format import duration, ground_words, scene_of
 _COLORS = ("#56B4E9", style.BLUE, style.GREEN, style.ORANGE, style.VERMILION, style.PURPLE)
 # A difference is drawn hollow unless it is so many times what the runs themselves are off by.
 _CLEAR = 3.0
+# By approximation: sliding, and sliding without friction.
+_LINES = ("-", ":")
 
 _KINDS = {
     "step": ("a step of the bare model", style.BLUE),
@@ -37,20 +39,29 @@ _PIECE_WORDS = {
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return what the paper's ground_cube leaves out: error and parting of the paths, and the spin, against stiffness.
 
-    experiments: one, as `experiments.pieces.measure` makes it. A row for each contact law.
+    A row for each contact law.
     """
     (dataset,) = experiments.values()
     laws = style.by_law([dataset])
     figure = style.new_figure(title, width=12.4, height=3.3 * len(laws) + 1.0)
     rows = figure.subplots(len(laws), 3, sharex=True, squeeze=False)
-    parts = {"error": _distances, "parting": _partings, "spin": _spins}
+    rough = dataset.friction.values[dataset.friction.values > 0].tolist()
+    looks = itertools.cycle({"color": color, "marker": mark} for color, mark in zip(_COLORS, "osD^vP", strict=True))
+    looks_of = {mu: {**look, "markersize": 4, "linewidth": 1.0} for mu, look in zip(rough, looks, strict=False)}
     for there, row in zip(laws, rows, strict=True):
-        for panel, (name, part) in zip(row, parts.items(), strict=True):
-            part(panel, there)
-            panel.set_title(f"{style.law_of(there)}: {name}")
+        for panel, name in zip(row, ("error", "parting", "spin"), strict=True):
+            panel.set(xscale="log", title=f"{style.law_of(there)}: {name}")
+        _draw_law(row, there, looks_of)
     for panel in rows[-1]:
         panel.set_xlabel(style.STIFFNESS)
-    figure.legend(handles=_legend(dataset), loc="outside right center")
+    handles = [
+        *(style.line(ground_words(friction=mu), **look) for mu, look in looks_of.items()),
+        style.line("sliding (ground_cube)", **style.THEORY | {"linestyle": "-"}),
+        style.line("sliding without friction", **style.THEORY | {"linestyle": ":"}),
+        style.line("theory, small μ", **style.THEORY),
+        style.line("second landing, μ = 0", **style.THEORY | {"color": style.QUIET}),
+    ]
+    figure.legend(handles=handles, loc="outside right center")
     launch = scene_of(dataset)["launch"]
     style.add_note(
         figure,
@@ -60,64 +71,32 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     return figure
 
 
-def _frictions(there: xr.Dataset) -> list[tuple[int, float, dict[str, Any]]]:
-    """Return index, coefficient and look of each friction but none."""
-    rough = [(f, mu) for f, mu in enumerate(there.friction.values.tolist()) if mu > 0]
-    looks = cycle({"color": color, "marker": marker} for color, marker in zip(_COLORS, "osD^vP", strict=True))
-    return [(f, mu, {**look, "markersize": 4}) for (f, mu), look in zip(rough, looks, strict=False)]
-
-
-def _distances(panel: Any, there: xr.Dataset) -> None:
+def _draw_law(row: Any, there: xr.Dataset, looks: Mapping[float, Any]) -> None:
+    """Draw a line for each friction; spin over friction, in which theory says that all friction is alike, if little."""
+    errors, partings, spins = row
     stiffness = there.stiffness.values
-    for f, _, look in _frictions(there):
-        for a, line in enumerate(("-", ":")):
-            error = there.landing_error.values[a, f]
-            clear = error > _CLEAR * there.numerical_error.values[f]
-            panel.plot(stiffness, error, linestyle=line, color=look["color"], linewidth=1.0)
-            common = look | {"linestyle": "none"}
-            panel.plot(stiffness[clear], error[clear], **common)
-            panel.plot(stiffness[~clear], error[~clear], **common, markerfacecolor="white")
-    panel.set(xscale="log", yscale="log")
-    panel.set_ylabel("distance just before the second landing [m]")
-
-
-def _partings(panel: Any, there: xr.Dataset) -> None:
-    for f, _, look in _frictions(there):
-        for a, line in enumerate(("-", ":")):
-            panel.plot(there.stiffness, there.parting_time[a, f], linestyle=line, linewidth=1.0, **look)
-    panel.plot(there.stiffness, there.second_landing[0], color=style.QUIET, linestyle="--", linewidth=1.0, zorder=1)
-    panel.set_xscale("log")
-    panel.set_ylabel(f"time until {100 * float(there.attrs['parted']):g} cm apart [s]")
-
-
-def _spins(panel: Any, there: xr.Dataset) -> None:
-    """Draw spin over friction, in which theory says that all friction is alike, if little."""
-    for f, mu, look in _frictions(there):
-        panel.plot(there.stiffness, there.spin[f] / mu, linewidth=1.0, **look)
-    f, mu, _ = _frictions(there)[0]
-    panel.plot(there.stiffness, there.spin_theory[f] / mu, **style.THEORY)
-    panel.axhline(0, color=style.QUIET, linewidth=0.8)
-    style.write_in_corner(panel, 0.98, "< 0: rolls backwards")
-    panel.set_xscale("log")
-    panel.set_ylabel("spin after the first landing over μ [rad/s]")
-
-
-def _legend(dataset: xr.Dataset) -> list[Any]:
-    frictions = _frictions(dataset)
-    return [
-        *(style.line(ground_words(friction=mu), linewidth=1.0, **look) for _, mu, look in frictions),
-        style.line("sliding (ground_cube)", **style.THEORY | {"linestyle": "-"}),
-        style.line("sliding without friction", **style.THEORY | {"linestyle": ":"}),
-        style.line("theory, small μ", **style.THEORY),
-        style.line("second landing, μ = 0", **style.THEORY | {"color": style.QUIET}),
-    ]
+    for mu, look in looks.items():
+        found = there.isel(friction=there.friction.values.tolist().index(mu))
+        for a, line in enumerate(_LINES):
+            error = found.landing_error.values[a]
+            clear = error > _CLEAR * found.numerical_error.values
+            errors.plot(stiffness, error, **look | {"linestyle": line, "marker": ""})
+            errors.plot(stiffness[clear], error[clear], **look | {"linestyle": "none"})
+            errors.plot(stiffness[~clear], error[~clear], **look, linestyle="none", markerfacecolor="white")
+            partings.plot(stiffness, found.parting_time[a], **look, linestyle=line)
+        spins.plot(stiffness, found.spin / mu, **look)
+    errors.set(yscale="log", ylabel="distance just before the second landing [m]")
+    partings.plot(stiffness, there.second_landing[0], color=style.QUIET, linestyle="--", linewidth=1.0, zorder=1)
+    partings.set_ylabel(f"time until {100 * float(there.attrs['parted']):g} cm apart [s]")
+    least = min(looks)
+    spins.plot(stiffness, there.spin_theory[there.friction.values.tolist().index(least)] / least, **style.THEORY)
+    spins.axhline(0, color=style.QUIET, linewidth=0.8)
+    style.write_in_corner(spins, 0.98, "< 0: rolls backwards")
+    spins.set_ylabel("spin after the first landing over μ [rad/s]")
 
 
 def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return how many times longer the model with a piece takes than the one without it, where no one needs it.
-
-    timings: as `experiments.pieces.time` makes them, a panel each.
-    """
+    """Return how many times longer the model with a piece takes than the one without it, where no one needs it."""
     figure = style.new_figure(title, width=4.6 * len(timings) + 1.4, height=5.4)
     panels = figure.subplots(1, len(timings), sharex=True, sharey=True, squeeze=False)[0]
     for panel, dataset in zip(panels, timings.values(), strict=True):
@@ -143,9 +122,8 @@ def _bars(panel: Any, dataset: xr.Dataset) -> None:
                 text = f" {ratio:.3g}×: {duration(full)} / {duration(least)}"
                 panel.text(max(1.0, ratio), place, text, va="center", fontsize=7.5)
     panel.axvline(1.0, color=style.INK, linewidth=0.8)
-    panel.set_xscale("log")
-    panel.set_xlim(0.6, 40 * max(4.0, float(np.nanmax([dataset[f"{kind}_ratio"] for kind in _KINDS]))))
+    most = float(np.nanmax([dataset[f"{kind}_ratio"] for kind in _KINDS]))
+    panel.set(xscale="log", xlim=(0.6, 40 * max(4.0, most)), xlabel="time with the piece over time without it [1]")
     panel.xaxis.set_major_formatter(ScalarFormatter())
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(visible=False, axis="y")
-    panel.set_xlabel("time with the piece over time without it [1]")

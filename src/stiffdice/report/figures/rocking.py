@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,20 +24,15 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.GREEN, "marker": "D", "markersize": 5.0},
     "corner": {"color": style.INK, "marker": "^", "markersize": 3.0},
 }
-_MODE_NAMES = {"face_bounce": "face bounce", "face_rocking": "face rocking", "edge": "edge", "corner": "corner"}
 # A pale mark within an outline: two inertias at one point show, too.
 _FILLS: dict[str, dict[str, Any]] = {
     "corners": {"alpha": 0.3, "markeredgewidth": 0, "zorder": 2.5},
     "solid": {"markerfacecolor": "none", "markeredgewidth": 1.0, "zorder": 3},
 }
-_NUDGES = {"bounce": "face_bounce", "rocking": "face_rocking"}
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return limits against damping, the longest step of each mode, and the growth of a nudge around the limit.
-
-    experiments: one, as `experiments.rocking.measure` makes it.
-    """
+    """Return limits against damping, the longest step of each mode, and the growth of a nudge around the limit."""
     (dataset,) = experiments.values()
     figure = style.new_figure(title, width=11.4, height=4.7)
     left, middle, right = figure.subplots(1, 3)
@@ -51,41 +47,43 @@ def _limits(panel: Any, dataset: xr.Dataset) -> None:
     zeta = dataset.zeta.values
     fine = np.linspace(0, zeta.max(), 201)
     panel.plot(fine, [linear_theory.stability_limit(value) for value in fine], **style.THEORY)
-    for i, inertia in enumerate(meanings_of(dataset.inertia)):
-        for k, mode in enumerate(meanings_of(dataset.mode)):
-            _marks(panel, zeta, dataset.limit.values[i, k], mode, inertia)
+    for (i, inertia), (k, mode) in _named(dataset.inertia, dataset.mode):
+        _marks(panel, zeta, dataset.limit.values[i, k], mode, inertia)
     error = readable(np.abs(dataset.limit_error.values).max(), digits=2)
     style.write_in_corner(panel, 0.98, f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}")
     panel.set_title("One limit in units of each mode's own ω")
-    panel.set_xlabel("damping ratio ζ of the mode [1]")
-    panel.set_ylabel("measured limit ωh [1]")
+    panel.set(xlabel="damping ratio ζ of the mode [1]", ylabel="measured limit ωh [1]")
+
+
+def _named(*enums: xr.DataArray) -> Iterator[tuple[tuple[int, str], ...]]:
+    """Yield all combinations of enums' values, each with its number."""
+    return itertools.product(*(enumerate(meanings_of(part)) for part in enums))
 
 
 def _longest_steps(panel: Any, dataset: xr.Dataset) -> None:
     """Draw h √(S/m) at the limit, with the least damping there is, and what theory says of it: limit over √k."""
     least = int(dataset.zeta.values.argmin())
-    modes, inertias = meanings_of(dataset.mode), meanings_of(dataset.inertia)
-    steps = dataset.longest_step.values[:, :, least]
-    numbers = dataset.mode_number_theory.values
+    modes = [mode.replace("_", " ") for mode in meanings_of(dataset.mode)]
+    steps, numbers = dataset.longest_step.values[:, :, least], dataset.mode_number_theory.values
     predicted = float(dataset.limit_theory[least]) / np.sqrt(numbers)
-    for i, inertia in enumerate(inertias):
-        worst = int(steps[i].argmin())
-        panel.axhline(steps[i, worst], color=_LOOKS[modes[worst]]["color"], linewidth=0.8, linestyle=":", zorder=1)
-        text = f"{inertia}: limited by {_MODE_NAMES[modes[worst]]}, {steps[i, worst]:.3f}"
-        style.write_beside(panel, text, (len(modes) - 0.45, steps[i, worst]), (0, -6), ha="right", va="top")
-        for k, mode in enumerate(modes):
-            panel.plot([k - 0.25, k + 0.25], [predicted[i, k]] * 2, **style.THEORY)
-            _marks(panel, [k], [steps[i, k]], mode, inertia, size=8)
+    for i, inertia in enumerate(meanings_of(dataset.inertia)):
+        worst, at = int(steps[i].argmin()), steps[i].min()
+        color = _LOOKS[meanings_of(dataset.mode)[worst]]["color"]
+        panel.axhline(at, color=color, linewidth=0.8, linestyle=":", zorder=1)
+        text = f"{inertia}: limited by {modes[worst]}, {at:.3f}"
+        style.write_beside(panel, text, (len(modes) - 0.45, at), (0, -6), ha="right", va="top")
+    for (i, inertia), (k, mode) in _named(dataset.inertia, dataset.mode):
+        panel.plot([k - 0.25, k + 0.25], [predicted[i, k]] * 2, **style.THEORY)
+        _marks(panel, [k], [steps[i, k]], mode, inertia, size=8)
     # Two inertias with the same k share a label.
     labels = {(k, round(numbers[i, k])): steps[i, k] for i, k in np.ndindex(steps.shape)}
     for (k, number), step in labels.items():
         style.write_beside(panel, f"k = {number}", (k, step), (0, 8), ha="center")
-    panel.set_xticks(range(len(modes)), [_MODE_NAMES[mode].replace(" ", "\n") for mode in modes])
+    panel.set_xticks(range(len(modes)), [mode.replace(" ", "\n") for mode in modes])
     panel.set_xlim(-0.5, len(modes) - 0.4)
     panel.set_ylim(min(steps.min() * 0.87, steps.min() - 0.05), steps.max() * 1.1)
     panel.set_title(f"The longest step, at ζ = {float(dataset.zeta[least]):g}")
-    panel.set_xlabel("contact mode, ω² = kS/m [rad²/s²]")
-    panel.set_ylabel("longest stable step h √(S/m) [1]")
+    panel.set(xlabel="contact mode, ω² = kS/m [rad²/s²]", ylabel="longest stable step h √(S/m) [1]")
 
 
 def _growths(panel: Any, dataset: xr.Dataset) -> None:
@@ -95,16 +93,14 @@ def _growths(panel: Any, dataset: xr.Dataset) -> None:
         limit = linear_theory.stability_limit(zeta)
         growth = [linear_theory.growth(part * limit, zeta) for part in fine]
         panel.plot(fine, growth, **style.THEORY)
-        for i, inertia in enumerate(meanings_of(dataset.inertia)):
-            for k, nudge in enumerate(meanings_of(dataset.nudge)):
-                size = 5 + 2 * (nudge == "bounce")
-                _marks(panel, scan, dataset.growth.values[i, k, z], _NUDGES[nudge], inertia, size=size)
+        for (i, inertia), (k, nudge) in _named(dataset.inertia, dataset.nudge):
+            size = 5 + 2 * (nudge == "bounce")
+            _marks(panel, scan, dataset.growth.values[i, k, z], f"face_{nudge}", inertia, size=size)
         style.write_beside(panel, f"ζ = {zeta:g}", (fine[-1], growth[-1]), (-14, 0), ha="right")
     stiffness = scene_of(dataset)["ground"]["stiffness"]
     style.write_in_corner(panel, 0.04, f"{ground_words(stiffness=stiffness)}\ngated, no friction")
     panel.set_title("A nudge to the cube at rest on its face")
-    panel.set_xlabel("ωh over its limit [1]")
-    panel.set_ylabel("growth of the nudge in a step [1]")
+    panel.set(xlabel="ωh over its limit [1]", ylabel="growth of the nudge in a step [1]")
 
 
 def _marks(
@@ -116,7 +112,7 @@ def _marks(
 
 def _legend() -> list[Any]:
     return [
-        *(style.mark(_MODE_NAMES[mode], **look, **_FILLS["solid"]) for mode, look in _LOOKS.items()),
+        *(style.mark(mode.replace("_", " "), **look, **_FILLS["solid"]) for mode, look in _LOOKS.items()),
         Patch(facecolor="none", edgecolor=style.INK, label="outline: solid inertia"),
         style.area("filled: corners inertia", style.INK, alpha=0.3),
         style.line("theory", **style.THEORY),

@@ -18,6 +18,8 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.errors import printable
 from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report.methods import name_of
+from stiffdice.simulation.engines.registry import PEERS
 
 # Okabe and Ito, "Color Universal Design" (2008), ordered by lightness in grey.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
@@ -57,6 +59,26 @@ VERDICT_LOOKS: dict[str, dict[str, str]] = {
     "stalled": {"color": PURPLE},
     "blew_up": {"color": "#B33C00"},
     "left_numeric_range": {"color": INK},
+}
+
+# Of a method: colour and mark.
+METHOD_LOOKS: dict[str, dict[str, Any]] = {
+    "symplectic_euler": {"color": BLUE, "marker": "o"},
+    "forward_euler": {"color": ORANGE, "marker": "v"},
+    "velocity_verlet": {"color": "#56B4E9", "marker": "s"},
+    "rk4": {"color": PURPLE, "marker": "D"},
+    "implicit_euler": {"color": "#997700", "marker": "^"},
+    "exact": {"color": GREEN, "marker": "*"},
+    "event": {"color": VERMILION, "marker": "P"},
+    "scipy_dop853": {"color": QUIET, "marker": "<"},
+    "scipy_lsoda": {"color": INK, "marker": ">"},
+    "scipy_radau": {"color": "#a9a9a9", "marker": "x"},
+    "mujoco": {"color": BLUE, "marker": "d"},
+    "pybullet": {"color": ORANGE, "marker": "h"},
+    "drake": {"color": PURPLE, "marker": "p"},
+    "scipy": {"color": INK, "marker": ">"},
+    "octave": {"color": GREEN, "marker": "X"},
+    "numpy": {"color": VERMILION, "marker": "+"},
 }
 
 _CRITERION_WORDS = {
@@ -132,6 +154,18 @@ def mark(label: str, marker: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, linestyle="none", marker=marker, **look)
 
 
+def method_look(method: str) -> dict[str, Any]:
+    """Return colour, mark and line of a method: our schemes full, engines and solvers dashed."""
+    dashes = "--" if method in PEERS else "-"
+    look = METHOD_LOOKS.get(method, {"color": QUIET, "marker": "."})
+    return look | {"linestyle": dashes, "linewidth": 1.0, "markersize": 6 if method == "exact" else 4}
+
+
+def method_handles(methods: Iterable[str]) -> list[Line2D]:
+    """Return a legend's lines."""
+    return [line(name_of(method), **method_look(method)) for method in methods]
+
+
 def area(label: str, color: str, **look: Any) -> Patch:
     """Return a coloured area for a legend."""
     return Patch(color=color, linewidth=0, label=label, **look)
@@ -158,6 +192,12 @@ def plain_log_ticks(axis: Any, multiples: Sequence[float] = (1.0, 2.0, 5.0)) -> 
 def by_law(found: Iterable[xr.Dataset]) -> list[xr.Dataset]:
     """Return a dataset for each contact law of sweeps or experiments."""
     return [part.isel(contact=k) for part in found for k in range(part.sizes["contact"])]
+
+
+def broken_criteria(found: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Return what was found by each criterion that some member breaks in some cell."""
+    by_name = {name: found.isel(criterion=c) for c, name in enumerate(meanings_of(found.criterion))}
+    return {name: part for name, part in by_name.items() if float(part.pass_fraction.min()) < 1}
 
 
 def law_of(found: xr.Dataset, contact: str = "contact") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,10 +15,11 @@ from stiffdice.report.number_format import describe
 
 def position(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return x, y and z of the centre of mass against time; y only where the cube leaves the plane y = 0."""
-    axes_shown = [k for k in range(3) if k != 1 or any(_leaves_plane(run) for run in runs.values())]
-    figure = style.new_figure(title, height=1.4 + 1.35 * len(axes_shown))
-    panels = figure.subplots(len(axes_shown), 1, sharex=True, squeeze=False)[:, 0]
-    for panel, k in zip(panels, axes_shown, strict=True):
+    leaves_plane = any(np.abs(run.position[:, 1]).max() > 1e-9 for run in runs.values())
+    shown = (0, 1, 2) if leaves_plane else (0, 2)
+    figure = style.new_figure(title, height=1.4 + 1.35 * len(shown))
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, k in zip(panels, shown, strict=True):
         for preset, run in runs.items():
             panel.plot(run.time, run.position[:, k], **style.PRESET_LOOKS[preset])
         panel.set_ylabel(f"{'xyz'[k]} [m]")
@@ -49,12 +51,8 @@ def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
     return _finish(figure, panels[-1], runs)
 
 
-def _leaves_plane(run: xr.Dataset) -> bool:
-    return bool(np.abs(run.position[:, 1]).max() > 1e-9)
-
-
-def _finish(figure: Figure, lowest: object, runs: Mapping[str, xr.Dataset]) -> Figure:
-    lowest.set_xlabel("time [s]")  # type: ignore[attr-defined]
-    lowest.margins(x=0.01)  # type: ignore[attr-defined]
+def _finish(figure: Figure, lowest: Any, runs: Mapping[str, xr.Dataset]) -> Figure:
+    lowest.set_xlabel("time [s]")
+    lowest.margins(x=0.01)
     style.add_note(figure, describe(next(iter(runs.values()))))
     return figure

@@ -44,10 +44,7 @@ _ROWS: dict[str, tuple[str, str, str]] = {
 
 
 def table(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
-    """Return a row for each limit: what happens, the formula, what it predicts, and what was found.
-
-    experiments: one, as `experiments.precision.measure` makes it.
-    """
+    """Return a row for each limit: what happens, the formula, what it predicts, and what was found."""
     (found,) = experiments.values()
     rows = [
         [_ROWS[name][0], _ROWS[name][1], readable(predicted, 3), readable(measured, 3), _ROWS[name][2]]

@@ -102,17 +102,14 @@ def _told(apart: list[float], errors: list[float], equal: int, within: int) -> l
 
 def _exponents(dense: xr.Dataset, found: xr.Dataset, law: str, criterion: str, edge: str) -> list[str]:
     """Return both exponents of the power law through an edge, and how far apart they are in standard errors."""
-    ours, theirs = (_exponent(data, law, criterion, edge) for data in (dense, found))
-    if not np.isfinite([*ours, *theirs]).all():
+    (ours, our_error), (theirs, error) = (_exponent(data, law, criterion, edge) for data in (dense, found))
+    if not np.isfinite([ours, our_error, theirs, error]).all():
         return ["", "", ""]
-    apart = abs(ours[0] - theirs[0]) / max(np.hypot(ours[1], theirs[1]), 1e-12)
-    return [f"{theirs[0]:.4f} ± {theirs[1]:.4f}", f"{ours[0]:.4f} ± {ours[1]:.4f}", f"{apart:.1f}"]
+    apart = abs(ours - theirs) / max(np.hypot(our_error, error), 1e-12)
+    return [f"{theirs:.4f} ± {error:.4f}", f"{ours:.4f} ± {our_error:.4f}", f"{apart:.1f}"]
 
 
 def _exponent(found: xr.Dataset, law: str, criterion: str, edge: str) -> tuple[float, float]:
-    here = {
-        "contact": found.contact.values.tolist().index(meanings_of(found.contact).index(law)),
-        "criterion": meanings_of(found.criterion).index(criterion),
-        "edge": list(EDGES).index(edge),
-    }
-    return tuple(float(found[name].isel(here)) for name in ("exponent", "exponent_error"))  # type: ignore[return-value]
+    contact = found.contact.values.tolist().index(meanings_of(found.contact).index(law))
+    place = contact, meanings_of(found.criterion).index(criterion), list(EDGES).index(edge)
+    return float(found.exponent.values[place]), float(found.exponent_error.values[place])

@@ -7,10 +7,11 @@ import xarray as xr
 from stiffdice.experiments.engines import limits as engine_limits
 from stiffdice.experiments.engines import speed as engine_speed
 from stiffdice.io.cf_enums import enum_attributes
-from stiffdice.report.figures import method_looks, style
+from stiffdice.report.figures import style
 from stiffdice.report.figures.engines import limits as limits_drawing
 from stiffdice.report.figures.engines import speed as speed_drawing
 from stiffdice.report.figures.engines import throw as throw_drawing
+from stiffdice.report.methods import name_of
 from stiffdice.scene.scene import from_mapping
 
 SCENE = from_mapping({"ground": {"stiffness": 1e6, "damping": 0.0}}, "as_written")
@@ -78,7 +79,7 @@ def test_notes_tell_versions_and_what_is_missing(limits, speed):
 
 def test_each_method_has_a_panel_with_the_limit_of_stability(limits):
     panels = drawn(limits_drawing, limits).axes
-    assert [panel.get_title(loc="left") for panel in panels] == [method_looks.name_of(name) for name in METHODS]
+    assert [panel.get_title(loc="left") for panel in panels] == [name_of(name) for name in METHODS]
     for panel in panels:
         assert any(np.allclose(line.get_xdata(), 2.0) for line in panel.get_lines())
 

@@ -3,12 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.patches import StepPatch
+from tests.report.figures import drawing
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import registry as figures
 from stiffdice.report.figures import style
-from stiffdice.report.figures.stability.refinement_check import draw
 from stiffdice.sweep import refinement_check, stability_limits
 
 
@@ -23,20 +22,13 @@ def given(collected):
 
 @pytest.fixture(scope="module")
 def drawn(given):
-    with style.applied():
-        return draw(given, "A title")
+    return drawing.drawn("refinement-check", given)
 
 
-def test_equal_data_give_equal_files(given, tmp_path):
-    for copy in "ab":
-        figures.draw("refinement-check", given, "A title", 50, [str(tmp_path / f"{copy}.svg")])
-    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
-
-
-def test_axes_have_units(drawn):
-    for axes in drawn.axes:
-        assert "[" in axes.get_xlabel()
-        assert "[" in axes.get_ylabel() or not axes.get_subplotspec().is_first_col()
+def test_axes_have_units_and_equal_data_give_equal_files(given, drawn, tmp_path):
+    drawing.check_units(drawn)
+    assert all("[" in axes.get_xlabel() for axes in drawn.axes)
+    drawing.check_equal_files("refinement-check", given, tmp_path)
 
 
 @pytest.mark.parametrize(("row", "edge"), [(0, "last_fail"), (1, "first_pass")])

@@ -5,14 +5,13 @@ import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
 from tests import rounds
+from tests.report.figures.drawing import check_equal_files, check_units, drawn
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.experiments import bounce_map
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import registry as figures
 from stiffdice.report.figures import style
 from stiffdice.scene.scene import from_mapping
-from stiffdice.study import catalogue
 from stiffdice.sweep import stability_limits
 from stiffdice.sweep.collect import collect
 from stiffdice.sweep.grid import Sweep
@@ -83,31 +82,10 @@ def given(combs, maps, bounces):
     return {"pass-fraction": combs, "stability-map": maps, "bounce-map": bounces}
 
 
-def drawn(name, data):
-    with style.applied():
-        return catalogue.DRAWINGS[name].load()(data, "A title")
-
-
 @pytest.mark.parametrize("name", ["pass-fraction", "stability-map", "bounce-map"])
-def test_equal_data_give_equal_files(given, tmp_path, name):
-    for copy in "ab":
-        paths = [str(tmp_path / f"{copy}.{kind}") for kind in ("svg", "png")]
-        figures.draw(name, given[name], "A title", 60, paths)
-    for kind in ("svg", "png"):
-        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
-
-
-@pytest.mark.parametrize("name", ["pass-fraction", "stability-map", "bounce-map"])
-def test_axes_have_units(given, name):
-    for axes in drawn(name, given[name]).axes:
-        spec = axes.get_subplotspec()
-        for label, outer in (
-            (axes.get_xlabel(), spec and spec.is_last_row()),
-            (axes.get_ylabel(), spec and spec.is_first_col()),
-        ):
-            assert "[" in label or not outer, axes
-        if spec is None:  # a colour bar
-            assert "[1]" in axes.get_xlabel() + axes.get_ylabel()
+def test_axes_have_units_and_equal_data_give_equal_files(given, tmp_path, name):
+    check_units(drawn(name, given[name]))
+    check_equal_files(name, given[name], tmp_path)
 
 
 def lines_of(axes):

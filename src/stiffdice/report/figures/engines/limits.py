@@ -21,13 +21,11 @@ from stiffdice.report.tables.engines import OFF, limit_of, within
 _COLUMNS = 3
 # Restitutions above are given by an arrow.
 _HIGHEST = 3.2
+_STAYS: dict[str, Any] = {"marker": "x", "markersize": 5, "color": style.INK}
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return restitution, from the least to the most over the phases, against ωh; a panel for each method.
-
-    experiments: one, as `experiments.engine_limits.measure` makes it.
-    """
+    """Return restitution, from the least to the most over the phases, against ωh; a panel for each method."""
     (found,) = experiments.values()
     names = meanings_of(found.method)
     lines = math.ceil(len(names) / _COLUMNS)
@@ -41,8 +39,8 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel in panels.flat[max(0, len(names) - _COLUMNS) : len(names)]:
         panel.set_xlabel("ωh [1]")
         panel.tick_params(labelbottom=True)
-    for line in panels:
-        line[0].set_ylabel("restitution e [1]")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("restitution e [1]")
     figure.legend(handles=_legend(), loc="outside right center")
     style.add_note(figure, engines_note([found]))
     return figure
@@ -51,9 +49,8 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 def _panel(panel: Any, found: xr.Dataset, limit: float) -> None:
     omega_h, restitution = found.omega_h.values, found.restitution.values
     exact = float(found.exact_restitution)
-    left = np.isfinite(restitution).any(axis=1)
-    low, high = (np.full(len(omega_h), np.nan) for _ in range(2))
-    low[left], high[left] = np.nanmin(restitution[left], axis=1), np.nanmax(restitution[left], axis=1)
+    # Over the phases at which it leaves; not-a-number where it does at none.
+    low, high = np.fmin.reduce(restitution, axis=1), np.fmax.reduce(restitution, axis=1)
     panel.set_xscale("log")
     panel.axhspan(exact * (1 - OFF[-1]), exact * (1 + OFF[-1]), color=style.FAINT, alpha=0.7, linewidth=0)
     panel.axhline(exact, **style.THEORY)
@@ -63,19 +60,15 @@ def _panel(panel: Any, found: xr.Dataset, limit: float) -> None:
         panel.plot(omega_h, edge, color=style.BLUE, linewidth=1.0)
     stays = (found.outcome.values != OUTCOMES.index("leaves")).any(axis=1)
     panel.plot(omega_h, np.where(stays, 0.0, np.nan), linestyle="none", **_STAYS)
-    if not math.isnan(limit) and limit < omega_h[-1]:
+    if limit < omega_h[-1]:
         panel.axvline(limit, color=style.GREEN, linewidth=1.2)
     top = float(np.nanmax(high))
     if top > _HIGHEST:
         style.write_in_corner(panel, 0.03, f"↑ to e = {top:.3g}\nat ωh = {omega_h[int(np.nanargmax(high))]:.3g}")
-    panel.set_ylim(-0.12, _HIGHEST)
-    panel.set_xlim(omega_h[0], omega_h[-1])
+    panel.set(xlim=omega_h[[0, -1]], ylim=(-0.12, _HIGHEST))
     panel.xaxis.set_major_locator(FixedLocator([0.02, 0.1, 0.5, 2, 10]))
-    panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    panel.xaxis.set_major_formatter("{x:g}")
     panel.xaxis.set_minor_formatter(NullFormatter())
-
-
-_STAYS: dict[str, Any] = {"marker": "x", "markersize": 5, "color": style.INK}
 
 
 def _legend() -> list[Any]:

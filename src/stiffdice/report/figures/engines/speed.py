@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,7 +22,7 @@ _HATCH = "////"
 
 
 def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return bars; timings: one, as `experiments.engine_speed.time` makes it."""
+    """Return bars."""
     (found,) = timings.values()
     names, problems = meanings_of(found.method), meanings_of(found.problem)
     rates = found.taken.values / found.seconds.values
@@ -29,23 +30,19 @@ def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     figure = style.new_figure(title, width=8.5, height=0.5 * len(names) + 1.7)
     panel = figure.subplots()
     thick = 0.8 / len(problems)
-    for p in range(len(problems)):
-        for place, k in enumerate(order):
-            if np.isnan(rates[p, k]):
-                continue
-            across = place + (len(problems) - 1 - 2 * p) / 2 * thick
-            hatch = _HATCH if stepper.own_steps(names[k]) else None
-            panel.barh(across, rates[p, k], thick, color=_COLORS[p], hatch=hatch, edgecolor="white", linewidth=0.5)
-            text = readable(rates[p, k], digits=2)
-            style.write_beside(panel, text, (rates[p, k], across), (3, 0), va="center", fontsize=7.5)
+    hatches = [_HATCH if stepper.own_steps(names[k]) else None for k in order]
+    for p, color in zip(range(len(problems)), _COLORS, strict=False):
+        across = np.arange(len(names)) + (len(problems) - 1 - 2 * p) / 2 * thick
+        look: dict[str, Any] = {"color": color, "edgecolor": "white", "linewidth": 0.5, "hatch": hatches}
+        bars = panel.barh(across, rates[p, order], thick, **look)
+        texts = ["" if np.isnan(rate) else readable(rate, digits=2) for rate in rates[p, order]]
+        panel.bar_label(bars, texts, padding=3, fontsize=7.5)
     panel.set_yticks(range(len(names)), [name_of(names[k]) for k in order])
-    panel.set(xscale="log", xlabel="steps a second [1/s]")
-    panel.set_xlim(np.nanmin(rates) / 3, np.nanmax(rates) * 5)
+    panel.set(xscale="log", xlabel="steps a second [1/s]", xlim=(np.nanmin(rates) / 3, np.nanmax(rates) * 5))
     panel.grid(visible=False, axis="y")
-    handles = [Patch(color=color, label=PROBLEMS[name].name) for color, name in zip(_COLORS, problems, strict=True)]
-    handles.append(
-        Patch(facecolor="white", edgecolor=style.QUIET, hatch=_HATCH, label="force evaluations: takes its own steps")
-    )
+    handles = [style.area(PROBLEMS[name].name, color) for color, name in zip(_COLORS, problems, strict=True)]
+    own: dict[str, Any] = {"facecolor": "white", "edgecolor": style.QUIET, "hatch": _HATCH}
+    handles.append(Patch(label="force evaluations: takes its own steps", **own))
     panel.legend(handles=handles, loc="lower right")
     machine = f"One thread of {found.attrs['machine_processor']}, medians of warm runs."
     style.add_note(figure, f"{machine} {engines_note([found])}")

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import method_looks, style
+from stiffdice.report.figures import style
 from stiffdice.report.methods import engines_note, name_of
 from stiffdice.report.number_format import readable
 
@@ -20,61 +21,43 @@ _REFERENCE: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.3
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return three panels; experiments: one, as `experiments.engine_throw.measure` makes it."""
+    """Return three panels: height, distance over time, distance over effort."""
     (found,) = experiments.values()
     names = meanings_of(found.method)
     figure = style.new_figure(title, width=12.5, height=4.6)
     left, middle, right = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.0])
-    contact = _first_contact(found)
-    _heights(left, found, names)
-    _distances(middle, found, names)
-    _efforts(right, found, names, contact)
+    height = found.reference_position.values[:, 2]
+    left.plot(found.time, height, **_REFERENCE)
+    own = np.maximum(found.reference_error, _SPAN[0])
+    middle.fill_between(found.time, _SPAN[0], own, color=style.FAINT, linewidth=0)
+    contact = _first_contact(height)
+    distance = np.clip(found.distance.values, *_SPAN)
+    for k, name in enumerate(names):
+        look = style.method_look(name)
+        left.plot(found.time, found.position.values[k, -1, :, 2], **look | {"marker": ""})
+        middle.plot(found.time[1:], distance[k, -1, 1:], markevery=0.1, **look)
+        right.plot(found.evaluations[k], distance[k, :, contact], **look)
+    left.set(xlabel="time [s]", ylabel="height of the centre [m]", title="height, at the most effort")
+    span = np.ptp(height)
+    left.set_ylim(height.min() - 0.1 * span, height.max() + 0.15 * span)
+    middle.set(yscale="log", ylim=_SPAN, xlabel="time [s]", ylabel="distance from the reference [m]")
+    middle.set_title("distance, at the most effort (grey: the reference's own)")
+    right.set(xscale="log", yscale="log", xlabel="force evaluations [1]", ylabel="distance from the reference [m]")
+    right.set_title(f"after the first landing, t = {float(found.time[contact]):.2f} s")
     reference = style.line(f"reference:\n{found.attrs['reference']}", **_REFERENCE)
-    figure.legend(handles=[reference, *method_looks.handles(names)], loc="outside right center")
+    figure.legend(handles=[reference, *style.method_handles(names)], loc="outside right center")
     unfit = found.attrs.get("unfit", "")
     note = " ".join([_steps(found, names), engines_note([found]), f"Cannot: {unfit}." if unfit else ""])
     style.add_note(figure, note.strip())
     return figure
 
 
-def _first_contact(found: xr.Dataset) -> int:
-    """Return the sample at which the first rebound is over: half way between the first landing and the next apex."""
-    height = found.reference_position.values[:, 2]
-    falls = np.flatnonzero((height[1:-1] < height[:-2]) & (height[1:-1] <= height[2:]))
-    low = int(falls[0]) + 1 if falls.size else len(height) - 1
-    later = np.flatnonzero((height[low + 1 : -1] > height[low:-2]) & (height[low + 1 : -1] >= height[low + 2 :]))
-    return low + 1 + int(later[0]) if later.size else len(height) - 1
-
-
-def _heights(panel: Any, found: xr.Dataset, names: list[str]) -> None:
-    panel.plot(found.time, found.reference_position.values[:, 2], **_REFERENCE)
-    for k, name in enumerate(names):
-        panel.plot(found.time, found.position.values[k, -1, :, 2], **method_looks.look(name) | {"marker": ""})
-    panel.set(xlabel="time [s]", ylabel="height of the centre [m]")
-    panel.set_title("height, at the most effort")
-    low, high = np.nanmin(found.reference_position.values[:, 2]), np.nanmax(found.reference_position.values[:, 2])
-    panel.set_ylim(low - 0.1 * (high - low), high + 0.15 * (high - low))
-
-
-def _distances(panel: Any, found: xr.Dataset, names: list[str]) -> None:
-    panel.set_yscale("log")
-    own = np.maximum(found.reference_error, _SPAN[0])
-    panel.fill_between(found.time, _SPAN[0], own, color=style.FAINT, linewidth=0)
-    for k, name in enumerate(names):
-        distance = found.distance.values[k, -1]
-        panel.plot(found.time[1:], np.clip(distance[1:], *_SPAN), markevery=0.1, **method_looks.look(name))
-    panel.set(xlabel="time [s]", ylabel="distance from the reference [m]")
-    panel.set_ylim(_SPAN)
-    panel.set_title("distance, at the most effort (grey: the reference's own)")
-
-
-def _efforts(panel: Any, found: xr.Dataset, names: list[str], contact: int) -> None:
-    panel.set(xscale="log", yscale="log")
-    for k, name in enumerate(names):
-        distance = np.clip(found.distance.values[k, :, contact], *_SPAN)
-        panel.plot(found.evaluations[k], distance, **method_looks.look(name))
-    panel.set(xlabel="force evaluations [1]", ylabel="distance from the reference [m]")
-    panel.set_title(f"after the first landing, t = {float(found.time[contact]):.2f} s")
+def _first_contact(height: Array) -> int:
+    """Return the sample at which the first rebound is over: the first apex after the first landing."""
+    changes = np.diff(np.sign(np.diff(height)))
+    landings, apexes = np.flatnonzero(changes > 0) + 1, np.flatnonzero(changes < 0) + 1
+    last = len(height) - 1
+    return int(apexes[apexes > landings.min(initial=last)].min(initial=last))
 
 
 def _steps(found: xr.Dataset, names: list[str]) -> str:

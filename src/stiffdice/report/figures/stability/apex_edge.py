@@ -23,8 +23,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel, found in zip(panels, columns, strict=True):
         _panel(panel, found)
     panels[0].set_ylabel("ωh of the last fail [1]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    figure.legend(handles=panels[0].get_lines(), loc="outside lower center", ncols=len(panels[0].get_lines()))
     return figure
 
 
@@ -37,7 +36,5 @@ def _panel(panel: Any, found: xr.Dataset) -> None:
         look = {"color": color, "marker": mark, "markersize": 4, "label": f"runs of {seconds:g} s"}
         panel.plot(heights, found.last_fail.values[k], **look)
     panel.plot(heights, found.predicted, label="theory: largest gain × R(H)", **style.THEORY)
-    panel.set(xscale="log", yscale="log")
+    panel.set(xscale="log", yscale="log", ylim=(0.2, 2.0), xlabel="rebounds count from this height on [m]")
     style.plain_log_ticks(panel.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
-    panel.set_ylim(0.2, 2.0)
-    panel.set_xlabel("rebounds count from this height on [m]")

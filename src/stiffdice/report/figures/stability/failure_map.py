@@ -38,10 +38,7 @@ _GAP = 0.4
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
-    """Return the maps, two for each axis side by side, with theory's limits over them.
-
-    experiments: one for each axis, as `experiments.extremes.measure` makes them.
-    """
+    """Return the maps, two for each axis side by side, with theory's limits over them."""
     found = list(experiments.values())
     rows = math.ceil(len(found) / 2)
     figure = style.new_figure(title, width=13.0, height=0.6 + 3.0 * rows + (1.6 if len(found) % 2 == 0 else 0.0))
@@ -115,8 +112,7 @@ def _limit(panel: Any, heights: Array, limits: Array, name: str) -> None:
     look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.3}
     look["path_effects"] = [patheffects.withStroke(linewidth=2.6, foreground="white")]
     numbers = heights > heights.min() + step if np.diff(np.sort(heights))[:1] > step else np.ones(len(heights), bool)
-    if heights.dtype.kind == "f" and numbers.sum() > 1:
-        panel.plot(limits[numbers], heights[numbers], label=name, **look)
+    panel.plot(limits[numbers], heights[numbers], label=name, **look)
     for height, limit in zip(heights[~numbers], limits[~numbers], strict=True):
         panel.plot([limit, limit], [height - step / 2, height + step / 2], label=name, **look)
 

@@ -25,15 +25,13 @@ _MAGIC_LOOK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8, "linestyle"
 # Magic steps beyond this n are not drawn: they lie too close.
 _LAST = 12
 
-# The first criterion has the widest line, the last the thinnest: all that lie on each other show.
 _WIDTHS = (3.6, 2.8, 1.8, 1.2, 0.7)
 
 
 def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the share of members that pass against the number of steps, a panel for each contact law and stiffness.
 
-    sweeps: as `stability_limits.find` makes them, cells sorted. A criterion that all members of a panel pass is told,
-    not drawn.
+    Cells are sorted. A criterion that all members of a panel pass is told, not drawn.
     """
     scans = [scan for found in sweeps.values() for scan in _scans(found)]
     figure = style.new_figure(title, width=10.5, height=1.3 + 2.6 * len(scans))
@@ -41,8 +39,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel, scan in zip(panels, scans, strict=True):
         _shares(panel, scan)
         _theory(panel, scan)
-        panel.set_title(_named(scan))
-        panel.set_ylabel("share of members\nthat pass [1]")
+        panel.set(title=_named(scan), ylabel="share of members\nthat pass [1]")
     steps = np.concatenate([scan.cell_steps.values for scan in scans])
     room = 0.02 * (steps.max() - steps.min())
     panels[-1].set(xlim=(steps.min() - room, steps.max() + 2 * room), ylim=(-0.08, 1.18), yticks=np.linspace(0, 1, 6))
@@ -59,24 +56,19 @@ def _scans(found: xr.Dataset) -> Iterator[xr.Dataset]:
         yield found.isel(cell=(laws == law) & (stiffnesses == stiffness))
 
 
-def _criteria(scan: xr.Dataset) -> tuple[dict[str, xr.Dataset], list[str]]:
-    """Return what was found by criterion, and the names of those that all members pass everywhere, left out of it."""
-    by_name = {name: scan.isel(criterion=c) for c, name in enumerate(meanings_of(scan.criterion))}
-    passed = [name for name, found in by_name.items() if (found.pass_fraction == 1).all()]
-    return {name: found for name, found in by_name.items() if name not in passed}, passed
-
-
 def _shares(panel: Any, scan: xr.Dataset) -> None:
     steps = scan.cell_steps.values
-    for name, found in _criteria(scan)[0].items():
-        color = style.CRITERION_LOOKS[name]["color"]
-        band = {"color": color, "alpha": 0.12, "linewidth": 0, "zorder": 1.5}
+    for name, found in style.broken_criteria(scan).items():
+        look = _line(name)
+        band = {"color": look["color"], "alpha": 0.12, "linewidth": 0, "zorder": 1.5}
         panel.fill_between(steps, found.pass_fraction_low, found.pass_fraction_high, **band)
-        panel.plot(steps, found.pass_fraction, color=color, linewidth=_width(name), label=name, zorder=2.5)
+        panel.plot(steps, found.pass_fraction, label=name, zorder=2.5, **look)
 
 
-def _width(criterion: str) -> float:
-    return dict(zip(style.CRITERION_LOOKS, _WIDTHS, strict=False)).get(criterion, _WIDTHS[-1])
+def _line(criterion: str) -> dict[str, Any]:
+    """Return a criterion's look: the first has the widest line, the last the thinnest; all that coincide show."""
+    widths = dict(zip(style.CRITERION_LOOKS, _WIDTHS, strict=False))
+    return {"color": style.CRITERION_LOOKS[criterion]["color"], "linewidth": widths.get(criterion, _WIDTHS[-1])}
 
 
 def _theory(panel: Any, scan: xr.Dataset) -> None:
@@ -95,7 +87,7 @@ def _theory(panel: Any, scan: xr.Dataset) -> None:
     panel.plot(taken, [-0.05] * len(taken), linestyle="none", **_PAPER_LOOK)
     shown = [value for value in _OMEGA_H if steps[0] <= product / value <= steps[-1]]
     top = style.top_axis(panel, [product / value for value in shown], [f"{value:g}" for value in shown])
-    top.set_xlabel("ωh of a flat landing [1]", fontsize=7.5)
+    top.set_xlabel(style.OMEGA_H, fontsize=7.5)
 
 
 def _of_the_paper(scan: xr.Dataset) -> bool:
@@ -103,7 +95,8 @@ def _of_the_paper(scan: xr.Dataset) -> bool:
 
 
 def _named(scan: xr.Dataset) -> str:
-    ground, passed = scene_of(scan)["ground"], _criteria(scan)[1]
+    ground, broken = scene_of(scan)["ground"], style.broken_criteria(scan)
+    passed = [name for name in meanings_of(scan.criterion) if name not in broken]
     stiffness = float(scan.cell_stiffness[0])
     numbers = ground_words(stiffness=stiffness, damping=ground["damping"], friction=ground["friction"])
     all_pass = f"; all pass: {', '.join(passed)}" if passed else ""
@@ -111,13 +104,9 @@ def _named(scan: xr.Dataset) -> str:
 
 
 def _legend(scans: Sequence[xr.Dataset]) -> list[Any]:
-    pairs = dict.fromkeys(
-        (name, float(found.tolerance)) for scan in scans for name, found in _criteria(scan)[0].items()
-    )
-    handles: list[Any] = []
-    for name, tolerance in pairs:
-        look = {"color": style.CRITERION_LOOKS[name]["color"], "linewidth": _width(name)}
-        handles.append(style.line(style.criterion_words(name, tolerance), **look))
+    broken = [style.broken_criteria(scan).items() for scan in scans]
+    pairs = dict.fromkeys((name, float(found.tolerance)) for items in broken for name, found in items)
+    handles: list[Any] = [style.line(style.criterion_words(*pair), **_line(pair[0])) for pair in pairs]
     handles.append(style.area("95 % confidence (Wilson)", style.QUIET, alpha=0.3))
     handles.append(style.line("magic step, ωh = 2 sin(π/2n)", **_MAGIC_LOOK))
     if any(_of_the_paper(scan) for scan in scans):

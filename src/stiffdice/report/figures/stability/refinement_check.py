@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -38,34 +38,28 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     columns = common(sweeps)
     if len(sweeps) > len(_LOOKS):
         raise InputError(f"refinement-check: draws {len(_LOOKS)} sweeps at most, not {len(sweeps)}")
+    first, *_ = sweeps.values()
     found = {name: scans(data) for name, data in sweeps.items()}
+    broken = [column for column in columns if any((parts[column].shares < 1).any() for parts in found.values())]
     laws = list(dict.fromkeys(column.contact for column in columns))
     figure = style.new_figure(title, width=5.0 * len(laws) + 0.4, height=11.4)
     panels = figure.subplots(4, len(laws), sharey="row", squeeze=False, height_ratios=(1.15, 1.15, 1, 0.7))
-    products = _products(next(iter(sweeps.values())))
+    limits = first.limit.values * linear_theory.STABILITY_LIMIT
+    products = dict(zip(first.stiffness.values.tolist(), limits, strict=True))
     for law, (*edges, shares, density) in zip(laws, panels.T, strict=True):
-        here = [column for column in columns if column.contact == law and _is_broken(found, column)]
-        first = next(iter(sweeps.values()))
+        here = [column for column in broken if column.contact == law]
         edges[0].set_title(style.law_of(first.sel(contact=meanings_of(first.contact).index(law))), pad=14)
         for panel, edge in zip(edges, _EDGES, strict=True):
             _edges(panel, here, found, products, edge)
         _shares(shares, here, found, products)
         _density(density, sweeps, law, shares.get_xlim())
-    for panel, edge in zip(panels[:2, 0], _EDGES.values(), strict=True):
-        panel.set_ylabel(f"{edge}: {style.OMEGA_H}")
-    panels[2, 0].set_ylabel("share of members that pass [1]")
-    panels[3, 0].set_ylabel("cells at a stiffness\nper e-fold of steps [1]")
-    figure.legend(handles=_legend(sweeps, columns, found), loc="outside lower center", ncols=2)
+    labels = [f"{edge}: {style.OMEGA_H}" for edge in _EDGES.values()]
+    labels += ["share of members that pass [1]", "cells at a stiffness\nper e-fold of steps [1]"]
+    for panel, label in zip(panels[:, 0], labels, strict=True):
+        panel.set_ylabel(label)
+    criteria = dict.fromkeys(column.criterion for column in broken)
+    figure.legend(handles=_legend(sweeps, criteria), loc="outside lower center", ncols=2)
     return figure
-
-
-def _products(found: xr.Dataset) -> dict[float, float]:
-    """Return ωh times steps by stiffness."""
-    return dict(zip(found.stiffness.values.tolist(), found.limit.values * linear_theory.STABILITY_LIMIT, strict=True))
-
-
-def _is_broken(found: Mapping[str, Mapping[Column, Scan]], column: Column) -> bool:
-    return any((parts[column].shares < 1).any() for parts in found.values())
 
 
 def _edges(
@@ -83,11 +77,12 @@ def _edges(
         stiffness = np.array([column.stiffness for column in along])
         product = np.array([products[column.stiffness] for column in along])
         color = style.CRITERION_LOOKS[criterion]["color"]
-        limits = [band(dense[column], edge) for column in along]
-        for place, scale, limit in zip(stiffness, product, limits, strict=True):
+        for column in along:
             # A box that all marks of a stiffness stand in front of.
             box = {"color": color, "alpha": 0.18, "linewidth": 0, "zorder": 1.5}
-            panel.fill_between([place / _BOX, place * _BOX], scale / limit.high, scale / limit.low, **box)
+            ends = [column.stiffness / _BOX, column.stiffness * _BOX]
+            low, high, _ = band(dense[column], edge)
+            panel.fill_between(ends, products[column.stiffness] / high, products[column.stiffness] / low, **box)
         for look, parts in zip(_LOOKS, found.values(), strict=False):
             steps = np.array([parts[column].edges[edge] for column in along])
             mark = _open(look) | {"color": color, "markeredgewidth": 1.1, "linestyle": "none", "zorder": 3}
@@ -108,12 +103,9 @@ def _shares(
     """Draw pass fractions of the least clear scan on the stiffest ground: means in bins, with 95 % bands."""
     panel.set(xscale="log", ylim=(-0.04, 1.08), xlabel=style.OMEGA_H)
     dense = next(iter(found.values()))
-    stiffest = max(column.stiffness for column in columns)
-    column = max(
-        (column for column in columns if column.stiffness == stiffest),
-        key=lambda column: np.count_nonzero(dense[column].shares % 1),
-    )
-    product = products[stiffest]
+    # On the stiffest ground, where most cells are in doubt.
+    column = max(columns, key=lambda column: (column.stiffness, np.count_nonzero(dense[column].shares % 1)))
+    product, stiffest = products[column.stiffness], column.stiffness
     ends = bins(*(parts[column] for parts in found.values()))
     panel.plot(product / dense[column].steps, dense[column].shares, color=style.FAINT, linewidth=0.7, zorder=1.2)
     centres = product / np.exp((ends[1:] + ends[:-1]) / 2)
@@ -147,19 +139,17 @@ def _density(panel: Any, sweeps: Mapping[str, xr.Dataset], law: str, span: tuple
     style.plain_log_ticks(panel.xaxis)
 
 
-def _legend(
-    sweeps: Mapping[str, xr.Dataset], columns: list[Column], found: Mapping[str, Mapping[Column, Scan]]
-) -> list[Any]:
+def _legend(sweeps: Mapping[str, xr.Dataset], criteria: Iterable[str]) -> list[Any]:
     """Return what marks and colours mean, and how many runs and steps each sweep asked for."""
     handles: list[Any] = []
-    whole = effort(next(iter(sweeps.values())))
+    first, *_ = sweeps.values()
+    whole = effort(first)
     for k, (look, (name, data)) in enumerate(zip(_LOOKS, sweeps.items(), strict=False)):
         runs, steps = effort(data)
         part = f" ({runs / whole[0]:.0%}), {steps / whole[1]:.0%} of the steps" if k else ""
         handles.append(style.mark(f"{name}: {runs:,} runs{part}", **_open(look, 6)))
-    first = next(iter(sweeps.values()))
     tolerances = dict(zip(meanings_of(first.criterion), first.tolerance.values.tolist(), strict=True))
-    for criterion in dict.fromkeys(column.criterion for column in columns if _is_broken(found, column)):
+    for criterion in criteria:
         words = f"{criterion}: {style.criterion_words(criterion, tolerances[criterion])}"
         handles.append(style.area(words, style.CRITERION_LOOKS[criterion]["color"], alpha=0.5))
     return [

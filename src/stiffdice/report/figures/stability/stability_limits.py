@@ -33,21 +33,20 @@ def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
         upper.set_title(model + style.law_of(frontier))
         _steps(upper, frontier)
         _omega_h(lower, frontier)
-        lower.set_xlabel(style.STIFFNESS)
     notes = max(len(panel.texts) for panel in panels[0])
-    panels[0, 0].set_ylim(top=panels[0, 0].get_ylim()[1] * 10 ** (0.12 * notes))  # room for them above the lines
-    panels[0, 0].set_ylabel(f"time steps in {scene_of(columns[0])['duration']:g} s [1]")
+    top = panels[0, 0].get_ylim()[1] * 10 ** (0.12 * notes)  # room for them above the lines
+    panels[0, 0].set(ylim=(None, top), ylabel=f"time steps in {scene_of(columns[0])['duration']:g} s [1]")
     panels[1, 0].set_ylabel(style.OMEGA_H)
     figure.legend(handles=_legend(columns), loc="outside lower center", ncols=3 if len(columns) > 1 else 1)
     return figure
 
 
 def _steps(panel: Any, frontier: xr.Dataset) -> None:
-    stiffness = frontier.stiffness.values
+    stiffness, broken = frontier.stiffness.values, style.broken_criteria(frontier)
     panel.set(xscale="log", yscale="log")
     panel.plot(stiffness, frontier.limit, zorder=4, **style.THEORY)
     notes = []
-    for criterion, found in _by_criterion(frontier):
+    for criterion, found in broken.items():
         look = style.CRITERION_LOOKS[criterion]
         first, last = found.first_pass.values, found.last_fail.values
         panel.fill_between(stiffness, first, last, color=look["color"], alpha=0.10, linewidth=0)
@@ -60,17 +59,10 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
             digits = 3 if fit["exponent_error"] >= 5e-4 else 4
             power = rf"$S^{{\,{fit['exponent']:.{digits}f}\pm{fit['exponent_error']:.{digits}f}}}$"
             notes.append((f"{criterion}: last fail ∝ {power}", look["color"]))
-    never_broken = set(meanings_of(frontier.criterion)) - {name for name, _ in _by_criterion(frontier)}
-    notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in sorted(never_broken)]
+    whole = sorted(set(meanings_of(frontier.criterion)) - set(broken))
+    notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in whole]
     for k, (note, color) in enumerate(notes):
         panel.text(0.03, 0.97 - 0.06 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
-
-
-def _by_criterion(frontier: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
-    """Return the criteria that some member breaks, each with what was found of it."""
-    names = meanings_of(frontier.criterion)
-    broken = frontier.pass_fraction.values.min(axis=1) < 1
-    return [(name, frontier.isel(criterion=c)) for c, name in enumerate(names) if broken[c]]
 
 
 def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str, str]) -> None:
@@ -81,22 +73,15 @@ def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str,
 
 def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
     """Draw the edges as ωh, over all scanned cells: a dot each, dark where members fail."""
-    panel.set(xscale="log", yscale="log")
+    panel.set(xscale="log", yscale="log", xlabel=style.STIFFNESS)
     scan = frontier.isel(cell=frontier.cell_contact.values == int(frontier.contact))
-    panel.scatter(
-        scan.cell_stiffness,
-        scan.cell_omega_h,
-        c=1 - scan.pass_fraction.values.min(axis=0),
-        s=2.5,
-        cmap="Greys",
-        vmin=-0.15,
-        vmax=1.3,
-        linewidths=0,
-        rasterized=True,  # as a drawing it would be 170 bytes a cell
-    )
+    failing = 1 - scan.pass_fraction.values.min(axis=0)
+    # As a drawing it would be 170 bytes a cell.
+    look: dict[str, Any] = {"s": 2.5, "cmap": "Greys", "vmin": -0.15, "vmax": 1.3, "linewidths": 0, "rasterized": True}
+    panel.scatter(scan.cell_stiffness, scan.cell_omega_h, c=failing, **look)
     panel.axhline(linear_theory.STABILITY_LIMIT, **style.THEORY)
     scale = frontier.limit.values * linear_theory.STABILITY_LIMIT
-    for criterion, found in _by_criterion(frontier):
+    for criterion, found in style.broken_criteria(frontier).items():
         first, last = (scale / found[edge].values for edge in ("first_pass", "last_fail"))
         _marks(panel, frontier.stiffness, first, last, style.CRITERION_LOOKS[criterion])
     style.plain_log_ticks(panel.yaxis)
@@ -104,12 +89,12 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
 
 def _legend(columns: list[xr.Dataset]) -> list[Any]:
     handles: list[Any] = []
-    tolerances = {name: float(found.tolerance) for frontier in columns for name, found in _by_criterion(frontier)}
-    hop_height = columns[0].attrs.get("hop_height")
-    for criterion, tolerance in tolerances.items():
-        look, words = style.CRITERION_LOOKS[criterion], style.criterion_words(criterion, tolerance, hop_height)
-        color, open_mark = look["color"], {"markersize": 5.5, "markerfacecolor": "none"}
-        handles.append(style.mark(f"first pass: {words}", look["first"], color=color, **open_mark))
-        handles.append(style.mark(f"last fail: {words}", look["last"], color=color, markersize=4))
+    found = {name: part for frontier in columns for name, part in style.broken_criteria(frontier).items()}
+    for criterion, part in found.items():
+        look = style.CRITERION_LOOKS[criterion]
+        words = style.criterion_words(criterion, float(part.tolerance), columns[0].attrs.get("hop_height"))
+        open_mark = {"color": look["color"], "markersize": 5.5, "markerfacecolor": "none"}
+        handles.append(style.mark(f"first pass: {words}", look["first"], **open_mark))
+        handles.append(style.mark(f"last fail: {words}", look["last"], color=look["color"], markersize=4))
     handles.append(style.line("theory: ωh = 2", **style.THEORY))
     return [*handles, style.area("scanned cell, darker: more fail", style.QUIET)]

@@ -24,7 +24,7 @@ _NUMBERED, _LAST = 6, 40
 def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the share of members that pass, a row for each criterion, a column for each sweep and contact law.
 
-    sweeps: as `stability_limits.find` makes them, cells sorted. Each cell reaches half-way to its neighbours, in the
+    Cells are sorted. Each cell reaches half-way to its neighbours, in the
     logarithms of stiffness and ωh. A criterion that all members pass is told, not drawn; one that is asked at two
     tolerances has two rows; a panel stays empty where a sweep was not asked.
     """
