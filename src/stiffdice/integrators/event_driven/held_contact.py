@@ -25,19 +25,18 @@ def slips(contact: Contact, motion: Any, about: Any) -> None:
 
 
 @njit
-def _change(physics: Physics, about: Vector, slip: Vector) -> Vector:
-    """Return by how much s/(|s| + ε) changes with a change of slip, by its tangent at the slip `about`."""
+def _tangent(physics: Physics, about: Vector) -> tuple[float, float]:
+    """Return what the tangent of s/(|s| + ε) at a slip takes of a change of slip, and what bends it along that slip."""
     length = norm(about)
     long = length + physics.cutoff
-    bend = dot(about, slip) / (length * long * long) if length > 0.0 else 0.0
-    return plus_times(times(1.0 / long, slip), -bend, about)
+    return 1.0 / long, 1.0 / (length * long * long) if length > 0.0 else 0.0
 
 
 @njit
 def _share(physics: Physics, about: Vector, slip: Vector) -> Vector:
     """Return s/(|s| + ε) of a slip by its tangent at the slip `about`."""
-    length = norm(about)
-    return plus_times(_change(physics, about, slip), length / (length + physics.cutoff) ** 2, about)
+    grip, bend = _tangent(physics, about)
+    return plus_times(times(grip, slip), bend * (dot(about, about) - dot(about, slip)), about)
 
 
 @njit
@@ -101,7 +100,7 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
         spring = physics.stiffness if contact.regime.bits[k] & BELOW else 0.0
         push = push_of(contact, k, node)
         line = plus_times(normal_of(physics), -physics.friction, _share(physics, tangent, node.slip))
-        law = spring, push, line, tangent
+        law = spring, push, line, tangent, _tangent(physics, tangent)
         for axis in range(3):
             one = unit(axis)
             _add(physics, node.arm, _force_change(physics, law, one, none), none, by_speed, axis)
@@ -114,19 +113,18 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
 
 
 @njit
-def _force_change(
-    physics: Physics, law: tuple[float, float, Vector, Vector], velocity: Vector, place: Vector
-) -> Vector:
+def _force_change(physics: Physics, law: Any, velocity: Vector, place: Vector) -> Vector:
     """Return by how much the force on a node changes with its velocity and its place.
 
-    law: the spring's stiffness, the normal force, the force's direction over it, and the slip of the tangent.
+    law: the spring's stiffness, the normal force, the force's direction over it, the slip of the tangent, and that.
     """
-    spring, push, line, tangent = law
+    spring, push, line, about, (grip, bend) = law
     n = normal_of(physics)
     speed = dot(n, velocity)
     lost = physics.damping * speed + spring * dot(n, place)
     slip = plus_times(velocity, -speed, n)
-    return plus_times(times(-lost, line), -physics.friction * push, _change(physics, tangent, slip))
+    change = plus_times(times(grip, slip), -bend * dot(about, slip), about)
+    return plus_times(times(-lost, line), -physics.friction * push, change)
 
 
 @njit
