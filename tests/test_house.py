@@ -59,12 +59,18 @@ CHANGES = {
         ("import apex, energy,", "import apex, energy, fastest,"),
         ('    "trajectory": trajectory,\n', '    "trajectory": trajectory,\n    "fastest": fastest,\n'),
     ],
-    "integrators/listed.py": [("class SymplecticEuler", "class Listed"), ("TAG = SymplecticEuler", "TAG = Listed")],
+    "integrators/listed.py": [
+        ('SymplecticEuler = namedtuple("SymplecticEuler"', 'Listed = namedtuple("Listed"'),
+        ("TAG = SymplecticEuler", "TAG = Listed"),
+    ],
     "integrators/registry.py": [
-        ("    implicit_euler,\n    rk4,", "    implicit_euler,\n    listed,\n    rk4,"),
+        ("implicit_euler, rk4", "implicit_euler, listed, rk4"),
         ('    "event": event,\n', '    "event": event,\n    "listed": listed,\n'),
     ],
-    "dynamics/models/gliding.py": [("class Sliding", "class Gliding"), ("TAG = Sliding", "TAG = Gliding")],
+    "dynamics/models/gliding.py": [
+        ('Sliding = namedtuple("Sliding"', 'Gliding = namedtuple("Gliding"'),
+        ("TAG = Sliding", "TAG = Gliding"),
+    ],
     "dynamics/models/registry.py": [
         ("import free_flight, sliding", "import free_flight, gliding, sliding"),
         ('    "flying": free_flight,\n', '    "flying": free_flight,\n    "gliding": gliding,\n'),
@@ -105,14 +111,12 @@ CHANGES = {
     "dynamics/contact.py": [
         (
             "LAWS = {",
-            """@_inlined
+            """@inlined
 def _twice_push(depth: Any, drag: Any, stiffness: float) -> Any:
     return _gated_push(depth, drag, 2.0 * stiffness)
 
 
-class Twice(NamedTuple):
-    pass
-
+Twice = namedtuple("Twice", ())
 
 LAWS = {""",
         ),

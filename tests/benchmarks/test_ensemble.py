@@ -11,7 +11,7 @@ from benchmarks.scenes import scene_of
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.state import Ensemble
-from stiffdice.integrators import batched_kernel
+from stiffdice.integrators import member_block
 from stiffdice.simulation import batch_loop
 from stiffdice.simulation.initial_conditions import turned
 from stiffdice.simulation.run import simulate
@@ -50,5 +50,5 @@ def test_operations_are_those_of_the_compiled_loop(model, contact, monkeypatch):
     (assembly,) = loop.inspect_asm().values()
     if "zmm" not in assembly:
         pytest.skip("this processor has other vectors")
-    width = batched_kernel.WIDTHS[type(batched_kernel.ABREAST[model])]
+    width = member_block.WIDTHS[type(member_block.ABREAST[model])]
     assert operations(assembly) == FLOPS[model, contact] * width / 8

@@ -85,7 +85,9 @@ def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     before = python(copy, first + RUN, **cache)
     assert python(copy, first + RUN, **cache) == before
     law = copy / "dynamics/contact.py"
-    law.write_text(law.read_text().replace("return upward(physics, state", "return 2.0 * upward(physics, state", 1))
+    law.write_text(
+        law.read_text().replace("return upward(physics, vector(state", "return 2.0 * upward(physics, vector(state", 1)
+    )
     after = python(copy, first + RUN, **cache)
     assert float(after) > float(before)
     assert len(list((tmp_path / "cache" / "stiffdice").iterdir())) == 2

@@ -48,17 +48,13 @@ def named(dataset):
     )
 
 
-def test_every_run_has_a_verdict_from_the_list_and_undecided_is_one_that_spent_its_budget(found):
+def test_every_run_has_a_verdict_from_the_list(found):
     assert found.verdict.dims == ("contact", "value", "steps")
     assert meanings_of(found.verdict) == [verdict.name.lower() for verdict in Verdict]
     assert set(np.unique(found.verdict)) <= set(Verdict)
-    undecided = found.verdict.values == Verdict.UNDECIDED
-    np.testing.assert_array_equal(
-        undecided, (found.steps_computed.values >= found.attrs["budget"]) & (found.verdict.values != Verdict.STALLED)
-    )
 
 
-def test_verdicts_and_measures_are_those_of_stepping(found):
+def test_verdicts_are_those_of_stepping(found):
     axis = found.attrs["axis"]
     chosen = failure_map.AXES[axis]
     for (c, v, s), verdict in np.ndenumerate(found.verdict.values):
@@ -67,14 +63,10 @@ def test_verdicts_and_measures_are_those_of_stepping(found):
             continue
         law = meanings_of(found.contact)[c]
         base = Scene() if axis in ("friction", "spin") else BASE
-        scene = chosen.placed(base.with_ground(contact=law), float(found["value"][v]))
+        value = (VALUES[axis] or chosen.values)[v]
+        scene = chosen.placed(base.with_ground(contact=law), value)
         stepped = simulate(scene, model=found.attrs["model"], steps=steps, every=steps, stop={"energy": BLOW_UP - 1})
-        assert verdict == stepped.verdict[0], (law, float(found["value"][v]), steps)
-        # v ω² h/g: a bounce multiplies round-off by about this (experiments/precision.py); a tumbling cube is chaotic.
-        growth = 9 * float(found.omega_h[v, s]) ** 2 * steps / 10 / 9.8
-        if verdict in (Verdict.PASSED, Verdict.SANK) and growth < 10 and axis != "spin":
-            for name in ("energy_ratio", "apex_ratio"):
-                assert float(found[name][c, v, s]) == pytest.approx(stepped.measures[name][0], rel=1e-3)
+        assert verdict == stepped.verdict[0], (law, value, steps)
 
 
 def test_a_ground_without_springs_is_sunk_into_and_one_too_stiff_for_the_steps_throws():
@@ -110,7 +102,7 @@ def test_explicit_damping_goes_unstable_beyond_two(law, nodes):
     assert verdicts[2:] == ["passed", "passed"]
     assert not {"passed"} & set(verdicts[:2])
     if law == "gated":  # in mid-air it is kicked up a little at each fall, for ever
-        assert float(dataset.energy_ratio[row, 0, 0]) > 10
+        assert verdicts[0] == "energy_grew"
 
 
 def test_limits_of_theory():

@@ -28,7 +28,6 @@ def test_every_mode_goes_unstable_at_the_limit_of_theory(measured):
     assert measured.limit.dims == ("inertia", "mode", "zeta")
     theoretical = 2 * (np.sqrt(1 + np.square(ZETA)) - ZETA)
     np.testing.assert_allclose(measured.limit, np.broadcast_to(theoretical, measured.limit.shape), rtol=1e-6)
-    np.testing.assert_allclose(measured.limit_error, measured.limit / theoretical - 1, rtol=0, atol=1e-12)
 
 
 def test_the_step_shows_the_modes_of_theory(measured):
@@ -70,15 +69,6 @@ def test_growth_is_what_one_step_does_to_a_run_above_the_limit():
     moved = run.trajectory.state["position"][:, 2] - rest
     found = rocking.measure(scene, zeta=[0], nudge_zeta=[0], omega_h_relative=[1.05]).growth
     np.testing.assert_allclose(-moved[13:16] / moved[12:15], found.values.ravel()[0], rtol=1e-5)
-
-
-def test_a_nudge_is_followed_to_the_end_unless_it_grows_or_another_mode_does(measured):
-    followed = measured.steps_followed.sel(nudge_zeta=0.0)
-    below, above = followed.isel(omega_h_relative=slice(0, 20)), followed.isel(omega_h_relative=slice(21, None))
-    assert above.max() < 15
-    assert (below.values[0] == 300).all()  # a solid cube, also where rocking is unstable
-    assert (below.values[1, 0] == 300).all()
-    assert below.values[1, 1].max() < 25  # with corners the bounce is unstable where rocking is not
 
 
 def test_everything_is_named_has_units_and_survives_a_file(measured, tmp_path):

@@ -13,7 +13,6 @@ import pytest
 from stiffdice.advice.recommend import advise
 from stiffdice.cli.main import main
 from stiffdice.errors import InputError
-from stiffdice.integrators import adaptive_steps
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.reader import open_file
 from stiffdice.scene.scene import from_mapping
@@ -43,7 +42,7 @@ def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps):
     begun = time.process_time()
     run = simulate(extreme(kind, law), scheme="event", steps=steps, every=steps)
     assert time.process_time() - begun < 60  # compiling included
-    assert run.evaluations[0] <= schemes.BUDGET + adaptive_steps.PART + 200
+    assert run.evaluations[0] <= schemes.BUDGET + schemes.PART + 200
     ended = Verdict(run.verdict[0])
     assert (run.steps_done[0] == steps) == (ended in (Verdict.PASSED, Verdict.SANK))
     assert ended in (Verdict.PASSED, Verdict.SANK, Verdict.UNDECIDED, Verdict.LEFT_NUMERIC_RANGE)
@@ -65,7 +64,7 @@ def test_a_step_taken_in_parts_is_the_step(scheme, model, monkeypatch):
     ground = {"contact": "gated", "stiffness": 1e7 if scheme == "event" else 1e4, "damping": 1e-6, "friction": 0}
     scene = from_mapping({"ground": ground, "launch": launch, "duration": 3.0 if scheme == "event" else 2e4})
     whole = simulate(scene, model=model, scheme=scheme, steps=1)
-    assert whole.evaluations[0] > 1.5 * adaptive_steps.PART
+    assert whole.evaluations[0] > 1.5 * schemes.PART
     assert Verdict(whole.verdict[0]) == Verdict.PASSED
     many = simulate(scene, model=model, scheme=scheme, steps=50)
     np.testing.assert_allclose(whole.end["position"], many.end["position"], rtol=1e-8)
@@ -77,7 +76,7 @@ def test_a_budget_spent_within_an_interval_is_undecided_and_again_the_same():
     assert Verdict(run.verdict[0]) == Verdict.UNDECIDED
     assert run.steps_done[0] < 3
     assert len(run.trajectory.time) == run.steps_done[0] + 1
-    assert 90_000 < run.evaluations[0] < 100_000 + adaptive_steps.PART + 200  # to find touch-downs is work, too
+    assert 90_000 < run.evaluations[0] < 100_000 + schemes.PART + 200  # to find touch-downs is work, too
     np.testing.assert_array_equal(run.end, again.end)
 
 

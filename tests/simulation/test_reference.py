@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiffdice.dynamics.state import STATE
-from stiffdice.simulation.reference import SAMPLES, distance, none, tabulated
+from stiffdice.simulation.reference import SAMPLES, distance, empty
 
 number = st.floats(-100, 100)
 vector = st.tuples(number, number, number).map(np.array)
@@ -24,8 +24,9 @@ def polynomial(coefficients, horizon):
         return (powers[1:] * coefficients[1:] * t ** (powers[1:] - 1)).sum(axis=0)
 
     times = np.linspace(0, horizon, SAMPLES + 1)
-    places, speeds = (np.array([curve(t) for t in times])[None] for curve in (path, velocity))
-    return tabulated(horizon, places, speeds)[0], path
+    reference = empty(1, horizon)
+    reference["position"], reference["velocity"] = ([curve(t) for t in times] for curve in (path, velocity))
+    return reference[0], path
 
 
 def at(place):
@@ -57,5 +58,5 @@ def test_distance_is_euclids(t):
 
 
 def test_none_is_compared_with_nothing():
-    assert none().shape == (1,)
-    assert none()["horizon"][0] < 0
+    assert empty().shape == (1,)
+    assert empty()["horizon"][0] < 0

@@ -25,9 +25,7 @@ rule experiment:
 
 # Alone on the machine: it takes every core that the workflow has, though it uses one. On a cluster it asks for one, and
 # the profile for a node of its own.
-rule timing:
-    input:
-        not_stale,
+use rule experiment as timing with:
     output:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
@@ -37,11 +35,5 @@ rule timing:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:
         "results/{study}/benchmarks/timings/{timing}.tsv"
+    priority: 0
     threads: lambda wildcards: 1 if on_cluster() else workflow.cores
-    resources:
-        mem_mb=growing(1000),
-        runtime=growing(30),
-    conda:
-        "../envs/stiffdice.yaml"
-    script:
-        "../scripts/measure.py"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from stiffdice.advice.pilot import SAMPLES, curve
 from stiffdice.advice.result import Advice, Option
-from stiffdice.experiments.sampling import states_of
+from stiffdice.experiments.measuring import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.simulation.run import Run, simulate
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from stiffdice.dynamics.model_selection import least_model
 from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.state import Array
-from stiffdice.experiments.sampling import states_of
+from stiffdice.experiments.measuring import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS

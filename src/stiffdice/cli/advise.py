@@ -82,11 +82,12 @@ def _in_radii(text: str, scene: Scene) -> str:
     """Return an error as a part of the radius if it is given as a length, any other as it is."""
     from stiffdice.scene import units
 
-    if units.has_unit(text, "m"):
-        return repr(units.in_si(text, "m") / scene.cube.radius)
     if comma := units.decimal_comma(text):
         raise InputError(f"--error = {text}: {comma}")
-    return text
+    try:
+        return repr(units.in_si(text, "m") / scene.cube.radius)
+    except ValueError:
+        return text
 
 
 def call(options: argparse.Namespace) -> int:

@@ -120,21 +120,18 @@ def njit(*function: Any, **options: Any) -> Any:
     call the function first. What is not kept in the cache on disk is a part of what is, and compiled as such.
     """
     options = {"error_model": "numpy", "fastmath": False} | options
-    if options.pop("cache", False):
+    cached = options.pop("cache", False)
 
-        def kernel(python: Callable[..., Any]) -> Any:
-            decorate: Any = numba.njit
-            compiled = decorate(python, **options)
-            compiled._cache = KernelCache(python)
-            return compiled
+    def compiled(python: Callable[..., Any]) -> Any:
+        if not cached:
+            wrappers = {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            return _Part(python, targetoptions=options | wrappers)
+        decorate: Any = numba.njit
+        kernel = decorate(python, **options)
+        kernel._cache = KernelCache(python)
+        return kernel
 
-        return kernel(*function) if function else kernel
-    options |= {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-    def part(python: Callable[..., Any]) -> _Part:
-        return _Part(python, targetoptions=options)
-
-    return part(*function) if function else part
+    return compiled(*function) if function else compiled
 
 
 def constant(value: Any) -> Any:
@@ -150,11 +147,10 @@ def constant(value: Any) -> Any:
 def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:
     """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
-    The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body is
-    chosen at compile time, which costs nothing in a loop; unlike functions passed as arguments it leaves the kernel
-    cacheable on disk, and unlike string literals it does not slow down every call of the kernel (1 µs against 11 ms,
-    numba 0.68). The body gets the arguments after the tag. inlined: put what chooses into its caller, whatever its
-    size: right for a body that is put there itself, and else only longer to compile.
+    The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body,
+    which gets the arguments after it, is chosen at compile time, which costs nothing in a loop; unlike functions passed
+    as arguments it leaves the kernel cacheable on disk, and unlike string literals it does not slow down every call of
+    it (1 µs against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
     """
 
     def call(tag: Any, *arguments: Any) -> Any:

@@ -8,37 +8,32 @@ ground, are in `scene/flat_landing.py`. The force is linear in depth and speed w
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.simd import where
+from stiffdice.dynamics.vector import Vector, cross, dot, inlined, norm, plus, plus_times, row, times, vector
 from stiffdice.scene.flat_landing import APPROACH_DAMPING
 
 # (fx, fy, fz, torque_x, torque_y, torque_z)
 Wrench = tuple[float, float, float, float, float, float]
 
 
-def _inlined(function: Any) -> Any:
-    return njit(function, forceinline=True)
-
-
-@_inlined
+@inlined
 def _ungated_push(depth: Any, drag: Any, stiffness: float) -> Any:
     return max(0.0, stiffness * max(0.0, depth) - drag)
 
 
-@_inlined
+@inlined
 def _gated_push(depth: Any, drag: Any, stiffness: float) -> Any:
     return where(depth > 0.0, max(0.0, stiffness * depth - drag), 0.0)
 
 
-class Ungated(NamedTuple):
-    """The law of the listings, fn = max(0, S*max(0, d) − D*un): damping and friction act in mid-air, too."""
-
-
-class Gated(NamedTuple):
-    """The law of section 4.2: only a node below the ground feels it."""
-
+# The law of the listings, fn = max(0, S*max(0, d) − D*un): damping and friction act in mid-air, too.
+Ungated = namedtuple("Ungated", ())
+# The law of section 4.2: only a node below the ground feels it.
+Gated = namedtuple("Gated", ())
 
 LAWS = {"ungated": Ungated(), "gated": Gated()}
 
@@ -83,47 +78,49 @@ def normal_slopes(law: Any, depth: float, speed: float, stiffness: float, dampin
     return (push(law, 1.0, 0.0, stiffness) if depth > 0.0 else 0.0), -damping
 
 
-@njit
-def upward(physics: Any, x: float, y: float, z: float) -> float:
+@inlined
+def normal_of(physics: Any) -> Vector:
+    """Return the ground's normal."""
+    return Vector(physics.nx, physics.ny, physics.nz)
+
+
+@inlined
+def upward(physics: Any, v: Vector) -> float:
     """Return the part of a vector along the ground's normal."""
-    return physics.nx * x + physics.ny * y + physics.nz * z
+    return dot(normal_of(physics), v)
 
 
-@njit
-def split(physics: Any, ux: float, uy: float, uz: float) -> tuple[float, float, float, float]:
+@inlined
+def split(physics: Any, velocity: Vector) -> tuple[float, Vector]:
     """Return a velocity's part along the ground's normal, and the vector along the ground that is left."""
-    speed = upward(physics, ux, uy, uz)
-    return speed, ux - speed * physics.nx, uy - speed * physics.ny, uz - speed * physics.nz
+    speed = upward(physics, velocity)
+    return speed, plus_times(velocity, -speed, normal_of(physics))
 
 
 @njit
 def height_of(physics: Any, state: Any) -> float:
     """Return the centre's height above the ground plane [m]."""
-    return upward(physics, state.position[0], state.position[1], state.position[2])
+    return upward(physics, vector(state.position))
 
 
 @njit
 def speed_of(physics: Any, state: Any) -> float:
     """Return the centre's speed away from the ground plane [m/s]."""
-    return upward(physics, state.velocity[0], state.velocity[1], state.velocity[2])
+    return upward(physics, vector(state.velocity))
 
 
 @njit
-def node_velocity(state: Any, k: int) -> tuple[float, float, float]:
+def node_velocity(state: Any, k: int) -> Vector:
     """Return the velocity u + ω × r of node k [m/s]."""
-    rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-    wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    return ux + (wy * rz - wz * ry), uy + (wz * rx - wx * rz), uz + (wx * ry - wy * rx)
+    return plus(vector(state.velocity), cross(vector(state.angular_velocity), row(state.node_offset, k)))
 
 
 @njit
 def lowest_of(physics: Any, state: Any) -> float:
     """Return how far below the centre the lowest node is [m]."""
     lowest = physics.reach
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        lowest = min(lowest, upward(physics, nodes[k, 0], nodes[k, 1], nodes[k, 2]))
+    for k in range(len(state.node_offset)):
+        lowest = min(lowest, upward(physics, row(state.node_offset, k)))
     return -lowest
 
 
@@ -132,9 +129,8 @@ def room_of(physics: Any, state: Any) -> float:
     """Return how much higher than the four lowest nodes the others are [m]; 0 if those are not at one height."""
     lowest = -lowest_of(physics, state)
     touching, others = 0, math.inf
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        above = upward(physics, nodes[k, 0], nodes[k, 1], nodes[k, 2]) - lowest
+    for k in range(len(state.node_offset)):
+        above = upward(physics, row(state.node_offset, k)) - lowest
         if above <= 1e-9 * physics.reach:
             touching += 1
         else:
@@ -150,17 +146,14 @@ def swing_square(omega: Any, h: Any, above_rest: Any, speed: Any) -> Any:
 
 
 @njit
-def node_force(law: Any, physics: Any, depth: float, ux: float, uy: float, uz: float) -> tuple[float, float, float]:
+def node_force(law: Any, physics: Any, depth: float, velocity: Vector) -> Vector:
     """Return the force on one node [N]: its weight, the normal force and friction, added in the listings' order.
 
     Friction is regularised as in the listings: its direction is u_tan/(|u_tan| + cutoff).
     """
-    speed, tx, ty, tz = split(physics, ux, uy, uz)
-    length = math.sqrt(tx * tx + ty * ty + tz * tz) + physics.cutoff
+    speed, slip = split(physics, velocity)
+    length = norm(slip) + physics.cutoff
     fn = normal_force(law, depth, speed, physics.stiffness, physics.damping)
-    grip = physics.friction * fn
-    return (
-        fn * physics.nx - grip * (tx / length),
-        fn * physics.ny - grip * (ty / length),
-        (fn * physics.nz - physics.node_weight) - grip * (tz / length),
-    )
+    push = times(fn, normal_of(physics))
+    pressed = Vector(push.x, push.y, push.z - physics.node_weight)
+    return plus_times(pressed, -physics.friction * fn, Vector(slip.x / length, slip.y / length, slip.z / length))

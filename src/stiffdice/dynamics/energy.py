@@ -7,17 +7,22 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of
+from stiffdice.dynamics.contact import height_of, normal_of
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Physics, States
+from stiffdice.dynamics.vector import Vector, dot, plus_times, row, vector
+
+
+@njit
+def _moving(physics: Physics, velocity: Vector, momentum: Vector) -> float:
+    """Return m u²/2 + L²/(2 I) [J], as in the throw listing."""
+    return 0.5 * physics.mass * dot(velocity, velocity) + 0.5 * dot(momentum, momentum) / physics.inertia
 
 
 @njit
 def kinetic(physics: Physics, state: Any) -> float:
-    """Return the kinetic energy of translation and rotation [J], m u²/2 + L²/(2 I) as in the throw listing."""
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
-    return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
+    """Return the kinetic energy of translation and rotation [J]."""
+    return _moving(physics, vector(state.velocity), vector(state.angular_momentum))
 
 
 @njit
@@ -27,12 +32,9 @@ def kinetic_at_place(model: Any, law: Any, physics: Physics, state: Any, lag_tim
     They are moved on at the acceleration of the state, as leapfrog's half-step velocities are (Hairer, Lubich and
     Wanner, Geometric Numerical Integration, I.1.4).
     """
-    fx, fy, fz, tx, ty, tz = models.force(model, law, physics, state)
-    per_mass = lag_time / physics.mass
-    ux, uy, uz = state.velocity[0] + per_mass * fx, state.velocity[1] + per_mass * fy, state.velocity[2] + per_mass * fz
-    momentum = state.angular_momentum
-    lx, ly, lz = momentum[0] + lag_time * tx, momentum[1] + lag_time * ty, momentum[2] + lag_time * tz
-    return 0.5 * physics.mass * (ux * ux + uy * uy + uz * uz) + 0.5 * (lx * lx + ly * ly + lz * lz) / physics.inertia
+    wrench = models.force(model, law, physics, state)
+    velocity = plus_times(vector(state.velocity), lag_time / physics.mass, vector(wrench))
+    return _moving(physics, velocity, plus_times(vector(state.angular_momentum), lag_time, vector(wrench[3:])))
 
 
 @njit
@@ -44,11 +46,10 @@ def potential(physics: Physics, state: Any) -> float:
 @njit
 def elastic(physics: Physics, state: Any) -> float:
     """Return the energy in the ground's springs [J], S d²/2 for each node at a depth d below the ground."""
-    height = height_of(physics, state)
-    energy = 0.0
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        depth = -(height + physics.nx * nodes[k, 0] + physics.ny * nodes[k, 1] + physics.nz * nodes[k, 2])
+    height, n, energy = height_of(physics, state), normal_of(physics), 0.0
+    for k in range(len(state.node_offset)):
+        node = row(state.node_offset, k)
+        depth = -(height + n.x * node.x + n.y * node.y + n.z * node.z)
         energy += 0.5 * physics.stiffness * max(0.0, depth) ** 2
     return energy
 

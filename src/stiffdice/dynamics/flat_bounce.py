@@ -27,8 +27,7 @@ from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 
-# Past this damping ratio less than (1/2ζ)² of the speed is left, and squares leave the range of doubles.
-DEAD = 1e150
+DEAD = 1e150  # past this damping ratio squares leave the range of doubles, and next to none of the speed is left
 
 
 @njit

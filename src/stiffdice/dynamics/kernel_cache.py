@@ -21,8 +21,8 @@ _DIGEST = hashlib.sha256().digest_size
 class KernelFiles:
     """The kernels of one function, a file for each signature and processor: SHA-256, then key and kernel, pickled.
 
-    Numba's own index and numbered data files know no damage; and two processes that compile two signatures at once may
-    give both the same number. folder: where they lie. name: of the function. stamp: of its source; part of every key.
+    Numba's own files know no damage; and two processes that compile two signatures at once may give both the same
+    number. folder: where they lie. name: of the function. stamp: of its source; part of every key.
     """
 
     def __init__(self, folder: Path, name: str, stamp: object) -> None:

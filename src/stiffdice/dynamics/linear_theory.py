@@ -10,11 +10,8 @@ import numpy.typing as npt
 from stiffdice.dynamics.state import Array
 from stiffdice.scene.scene import Scene
 
-# Symplectic Euler without damping is linearly stable below this ωh.
-STABILITY_LIMIT = 2.0
-
-# Nodes that carry a flat landing.
-BOUNCE_NODES = 4
+STABILITY_LIMIT = 2.0  # below this ωh symplectic Euler without damping is linearly stable
+BOUNCE_NODES = 4  # carry a flat landing
 
 
 def contact_frequency(stiffness: float, mass: float, nodes: float = BOUNCE_NODES) -> float:
@@ -50,10 +47,7 @@ def stability_limit(zeta: float) -> float:
 
 
 def growth(omega_h: float, zeta: float) -> float:
-    """Return the factor [1] by which a step of symplectic Euler with explicit damping lets a motion grow in the end.
-
-    The larger modulus of the roots of the polynomial in `stability_limit`.
-    """
+    """Return the larger modulus [1] of the roots of the polynomial in `stability_limit`: a step's growth in the end."""
     damping = 2 * zeta * omega_h
     trace, determinant = 2 - omega_h**2 - damping, 1 - damping
     discriminant = trace * trace - 4 * determinant
@@ -66,8 +60,7 @@ def magic_step(n: float) -> float:
     """Return ωh = 2 sin(π/(2n)) [1]: half a period of an undamped contact is n steps, n >= 1.
 
     The discrete oscillator turns by θ in a step, 2 sin(θ/2) = ωh. Here θ = π/n: with a whole n > 1, n steps later depth
-    and speed have changed their signs, at whatever phase the step met the ground, and the bounce keeps its energy. Half
-    way between two of them, at n = 3/2, 5/2, ..., it may gain as much as `gain_bound`.
+    and speed have changed their signs, at whatever phase the step met the ground, and the bounce keeps its energy.
     """
     return 2 * math.sin(math.pi / (2 * n))
 

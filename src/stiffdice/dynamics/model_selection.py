@@ -8,12 +8,9 @@ A model leaves something out, and is exact where that would do nothing:
   those four alone;
 - friction and the place on the ground (`vertical`), where nothing moves the cube along level ground.
 
-Exact is meant of the motion, not of round-off, which the full model may amplify: of a cube that is flat on a slope,
-each bounce makes a torque of round-off larger (measured: 7 times at S = 1e2, 2400 times at 1e6 kg/s², 1 kg), and steps
-too long for friction's cutoff make chatter of it (`friction_chatter.py`).
-
-A flat cube whose centre stays above the ground is righted by every contact. On an edge or a corner, or with its centre
-below the ground, the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
+Exact is meant of the motion, not of round-off, which the full model may amplify (docs/method.md). A flat cube whose
+centre stays above the ground is righted by every contact. On an edge or a corner, or with its centre below the ground,
+the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
 """
 
 from __future__ import annotations
@@ -30,8 +27,7 @@ from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 
-AUTO = "auto"
-AS_ASKED = "as asked"
+AUTO, AS_ASKED = "auto", "as asked"
 CHOICES = (*MODELS, AUTO)
 
 # From the least on. Where a scene requires one of the last three, whatever else it requires on other ground is exact,
@@ -41,7 +37,6 @@ _ORDER = ("flying", "vertical", "sliding", "tumbling")
 # In units of the side: what rounding a normal, a rotation vector of up to 15 digits and the rotation itself can do to
 # the height of a node, some 40 units in the last place.
 ROUND_OFF = 1e-14
-
 # In units of all lengths in a flight: far above what its round-off can add up to.
 _MARGIN = 1e-9
 
@@ -51,9 +46,8 @@ _ISOTROPY = "its inertia, the same about every axis, needs no tensor that turns 
 def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
     """Return the least model that is exact for a scene, and a sentence that says why.
 
-    longest_step [s]: of the runs it is for. A scheme's own flight may leave the parabola by what gravity adds in a step
-    to the speed, and members of an ensemble fly on for up to a step; only a flight that clears the ground even so is
-    `flying`.
+    longest_step [s]: of the runs it is for. A scheme's flight may leave the parabola by what gravity adds in a step to
+    the speed, and members fly on for up to a step; only a flight that clears the ground even so is `flying`.
     """
     name, reason = _least(scene, longest_step)
     return name, f"{name}: {reason}" + (f"; {_ISOTROPY}" if name == "tumbling" else "")
@@ -141,8 +135,7 @@ def lands_flat(scene: Scene, tolerance: float = ROUND_OFF) -> bool:
 
 def _heights(scene: Scene) -> Array:
     """Return how high above the centre each node is at the launch [m], shape (node,)."""
-    heights: Array = along(start_of(scene, "tumbling")["node_offset"][0], scene.ground.normal)
-    return heights
+    return along(start_of(scene, "tumbling")["node_offset"][0], scene.ground.normal)
 
 
 def _along(scene: Scene, vector: validation.Vector) -> float:
@@ -151,10 +144,7 @@ def _along(scene: Scene, vector: validation.Vector) -> float:
 
 
 def _clears(scene: Scene, longest_step: float) -> bool:
-    """Return whether no node reaches the ground before the end in a flight under gravity alone.
-
-    Nor does any then under the drag of the `ungated` law, which never pushes towards the ground.
-    """
+    """Return whether no node reaches the ground before the end in a flight under gravity, nor then under drag."""
     height, speed = _along(scene, scene.launch.position), _along(scene, scene.launch.velocity)
     pull, time = scene.gravity * scene.ground.normal[2], scene.duration + longest_step
     slow = speed - abs(pull) * longest_step

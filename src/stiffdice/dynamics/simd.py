@@ -34,37 +34,36 @@ cgutils: Any = _cgutils
 _DOUBLE = ir.DoubleType()
 
 
-class Lanes(types.Type):
+class _Wide(types.Type):
+    part: ir.Type
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"{type(self).__name__}({width})")
+
+
+class Lanes(_Wide):
     """The type of `width` doubles side by side."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(name=f"Lanes({width})")
+    part = _DOUBLE
 
 
-class Mask(types.Type):
+class Mask(_Wide):
     """The type of `width` truth values side by side."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(name=f"Mask({width})")
+    part = ir.IntType(1)
 
 
 @register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Lanes) -> None:
-        super().__init__(manager, kind, ir.VectorType(_DOUBLE, kind.width))  # type: ignore[no-untyped-call]
-
-
 @register_model(Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Mask) -> None:
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))  # type: ignore[no-untyped-call]
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: _Wide) -> None:
+        super().__init__(manager, kind, ir.VectorType(kind.part, kind.width))  # type: ignore[no-untyped-call]
 
 
 def _splat(context: Any, builder: Any, value: Any, given: Any, width: int) -> Any:
-    """Return a value as lanes: itself, or a number in every lane."""
-    if isinstance(given, Lanes):
+    """Return a value as lanes: itself, or a number in every lane; a mask as it is."""
+    if isinstance(given, (Lanes, Mask)):
         return value
     value = context.cast(builder, value, given, types.float64)
     one = builder.insert_element(ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined), value, ir.IntType(32)(0))
@@ -89,12 +88,7 @@ def _define(function: Any, count: int, build: Callable[..., Any], result: type =
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         width = sig.return_type.width
-        vectors = (
-            args
-            if of is Mask
-            else [_splat(context, builder, *pair, width) for pair in zip(args, sig.args, strict=True)]
-        )
-        return build(builder, *vectors)
+        return build(builder, *(_splat(context, builder, *pair, width) for pair in zip(args, sig.args, strict=True)))
 
     for choice in range(1, 2**count if of is Lanes else 2):
         kinds = [of if (of is Mask or choice >> k & 1) else types.Float for k in range(count)]
@@ -109,31 +103,29 @@ def _max(builder: Any, a: Any, b: Any) -> Any:
 def _call(name: str) -> Callable[..., Any]:
     """Return what builds a call of LLVM's intrinsic of this name."""
 
-    def build(builder: Any, *vectors: Any) -> Any:
-        kind = vectors[0].type
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(kind, [kind] * len(vectors)), f"llvm.{name}.v{kind.count}f64"
+    def build(builder: Any, vector: Any) -> Any:
+        kind = ir.FunctionType(vector.type, [vector.type])
+        return builder.call(
+            cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{vector.type.count}f64"), [vector]
         )
-        return builder.call(function, vectors)
 
     return build
 
 
-_define(operator.add, 2, lambda builder, a, b: builder.fadd(a, b))
-_define(operator.sub, 2, lambda builder, a, b: builder.fsub(a, b))
-_define(operator.mul, 2, lambda builder, a, b: builder.fmul(a, b))
-_define(operator.truediv, 2, lambda builder, a, b: builder.fdiv(a, b))
-_define(operator.neg, 1, lambda builder, a: builder.fneg(a))
+_define(operator.add, 2, ir.IRBuilder.fadd)
+_define(operator.sub, 2, ir.IRBuilder.fsub)
+_define(operator.mul, 2, ir.IRBuilder.fmul)
+_define(operator.truediv, 2, ir.IRBuilder.fdiv)
+_define(operator.neg, 1, ir.IRBuilder.fneg)
 _define(abs, 1, _call("fabs"))
 _define(math.sqrt, 1, _call("sqrt"))
 _define(max, 2, _max)
-for _compare, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"), (operator.ge, ">=")):
+for _compare, _sign in {operator.lt: "<", operator.gt: ">", operator.ge: ">=", operator.eq: "=="}.items():
     _define(_compare, 2, lambda builder, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b), Mask)
-_define(operator.eq, 2, lambda builder, a, b: builder.fcmp_ordered("==", a, b), Mask)
-_define(operator.and_, 2, lambda builder, a, b: builder.and_(a, b), Mask, Mask)
-_define(operator.or_, 2, lambda builder, a, b: builder.or_(a, b), Mask, Mask)
-_define(operator.xor, 2, lambda builder, a, b: builder.xor(a, b), Mask, Mask)
-_define(operator.invert, 1, lambda builder, a: builder.not_(a), Mask, Mask)
+_define(operator.and_, 2, ir.IRBuilder.and_, Mask, Mask)
+_define(operator.or_, 2, ir.IRBuilder.or_, Mask, Mask)
+_define(operator.xor, 2, ir.IRBuilder.xor, Mask, Mask)
+_define(operator.invert, 1, ir.IRBuilder.not_, Mask, Mask)
 
 
 def _row(context: Any, builder: Any, array: Any, kind: Any, index: Any, width: int) -> Any:

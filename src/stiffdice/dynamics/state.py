@@ -57,27 +57,16 @@ class Physics(NamedTuple):
 
 def physics_of(scene: Scene) -> Physics:
     """Return the scene's numbers as a kernel takes them."""
-    nodes = scene.cube.node_offsets()
-    node_weight = scene.cube.mass / len(nodes) * scene.gravity
+    cube, ground, nodes = scene.cube, scene.ground, scene.cube.node_offsets()
+    node_weight = cube.mass / len(nodes) * scene.gravity
     weight = 0.0
     for _ in nodes:
         weight += node_weight
-    return Physics(
-        scene.cube.mass,
-        scene.gravity,
-        scene.cube.moment_of_inertia,
-        scene.ground.stiffness,
-        scene.ground.damping,
-        scene.ground.friction,
-        *scene.ground.normal,
-        cutoff=1e-6 * scene.cube.radius,
-        node_weight=node_weight,
-        weight=weight,
-        # The margin covers what rotating the nodes step by step can add in round-off.
-        reach=float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6),
-        radius=scene.cube.radius,
-        side=scene.cube.side,
-    )
+    # The margin covers what rotating the nodes step by step can add in round-off.
+    reach = float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6)
+    forces = ground.stiffness, ground.damping, ground.friction, *ground.normal, 1e-6 * cube.radius
+    sizes = reach, cube.radius, cube.side
+    return Physics(cube.mass, scene.gravity, cube.moment_of_inertia, *forces, node_weight, weight, *sizes)
 
 
 # The models that turn the cube; the others leave its spin out.

@@ -3,9 +3,7 @@
 Under the `ungated` law a falling cube is braked in the air. A rebound from a height H returns, solved exactly, to
 R(H) H: the lower H is, the shorter is the fall and the less it costs. Symplectic Euler multiplies the energy of a
 bounce by up to `linear_theory.largest_gain`, so that a rebound goes higher than the one before as soon as R(H) · gain
-exceeds 1 + tolerance. So the lowest rebounds that count decide; and where nothing says which count, the duration
-decides, as it sets how low they become before the end. Under the `gated` law R hardly depends on H: height and duration
-do not matter.
+exceeds 1 + tolerance: the lowest rebounds that count decide. Under the `gated` law R hardly depends on H.
 """
 
 from __future__ import annotations
@@ -20,9 +18,7 @@ import xarray as xr
 from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import Array
-from stiffdice.experiments import options
-from stiffdice.experiments.bisection import bisected
-from stiffdice.experiments.layout import CONTACT, quantity
+from stiffdice.experiments.measuring import bisected, mapped, numbers, span
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -38,6 +34,9 @@ _LARGEST_RATIO = apex.BASE + apex.TOLERANCE
 # Values of ωh at which the gain is computed, evenly in the logarithm: the gain's own teeth are 1/n apart.
 _FINE = 4000
 
+_MEASURED = {"last_fail": ("smallest omega h of the scan at which the apex of a member rises", "1")}
+_PREDICTED = {"predicted": ("smallest omega h at which a rebound from the hop height may rise", "1")}
+
 
 def measure(
     scene: Scene,
@@ -51,47 +50,31 @@ def measure(
     """Return the edge of `apex` in ωh, dimensions contact, duration and hop_height, and the predicted one.
 
     hop_height [m]: lower rebounds are not judged. duration [s]: of the runs. omega_h: ends of the scan; count: values
-    in it, evenly in their logarithm. members: launches at each. `last_fail` is the smallest ωh, so the most steps, at
-    which a member fails; not-a-number where none does.
-
-    Raises InputError for a number out of range.
+    in it, evenly in their logarithm. members: launches at each. `last_fail` is the smallest ωh at which a member fails;
+    not-a-number where none does. Raises InputError for a number out of range.
     """
-    heights = options.numbers("hop_height", hop_height, "m", at_least=0)
-    durations = options.numbers("duration", duration, "s", above=0)
-    low, high = options.span(omega_h, below=linear_theory.STABILITY_LIMIT)
+    heights = numbers("hop_height", hop_height, "m", at_least=0)
+    durations = numbers("duration", duration, "s", above=0)
+    low, high = span(omega_h, below=linear_theory.STABILITY_LIMIT)
     scan = np.geomspace(low, high, validation.count("count", count, at_least=2))
     members = validation.count("members", members)
-    edges = np.full((len(LAWS), len(durations), len(heights)), np.nan)
-    predicted = np.full((len(LAWS), len(heights)), np.nan)
-    for k, law in enumerate(LAWS):
-        ground = scene.with_ground(contact=law)
-        for i, height in enumerate(heights):
-            predicted[k, i] = prediction(ground, height)
-            for j, seconds in enumerate(durations):
-                edges[k, j, i] = _last_fail(dataclasses.replace(ground, duration=seconds), height, scan, members)
-    grid = ("contact", "duration", "hop_height")
-    attributes = dataset.provenance_attributes(
-        "Edge of apex by hop height and duration", scene, MODEL, SCHEME, __name__
-    )
-    return xr.Dataset(
-        {
-            "last_fail": quantity(grid, edges, "smallest omega h of the scan at which the apex of a member rises"),
-            "predicted": quantity(
-                grid[::2], predicted, "smallest omega h at which a rebound from the hop height may rise"
-            ),
-        },
-        {
-            "contact": CONTACT,
-            "duration": quantity("duration", durations, "duration of the runs", "s"),
-            "hop_height": quantity("hop_height", heights, "height from which rebounds count", "m"),
-        },
-        attributes
-        | {
-            "members": members,
-            "criteria": dataset.criteria_text(_CRITERIA),
-            "scene_note": "contact law and duration are the table's, not the scene's",
-        },
-    )
+
+    def last_fail(law: str, seconds: float, height: float) -> list[float]:
+        there = dataclasses.replace(scene.with_ground(contact=law), duration=seconds)
+        return [_last_fail(there, height, scan, members)]
+
+    def predicted(law: str, height: float) -> list[float]:
+        return [prediction(scene.with_ground(contact=law), height)]
+
+    found = mapped(last_fail, _MEASURED, contact=LAWS, duration=durations, hop_height=heights)
+    found |= mapped(predicted, _PREDICTED, contact=LAWS, hop_height=heights)
+    title = "Edge of apex by hop height and duration"
+    attributes = dataset.provenance_attributes(title, scene, MODEL, SCHEME, __name__) | {
+        "members": members,
+        "criteria": dataset.criteria_text(_CRITERIA),
+        "scene_note": "contact law and duration are the table's, not the scene's",
+    }
+    return xr.Dataset(found, attrs=attributes)
 
 
 def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
@@ -117,10 +100,8 @@ def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
 def prediction(scene: Scene, height: float) -> float:
     """Return the smallest ωh [1] at which a rebound from a height [m] may go higher by more than `apex` tolerates."""
     ratio = returned(scene, height)
-    for omega_h in np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE):
-        if ratio * linear_theory.largest_gain(float(omega_h)) > _LARGEST_RATIO:
-            return float(omega_h)
-    return math.nan
+    scan = np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE).tolist()
+    return next((value for value in scan if ratio * linear_theory.largest_gain(value) > _LARGEST_RATIO), math.nan)
 
 
 def returned(scene: Scene, height: float) -> float:

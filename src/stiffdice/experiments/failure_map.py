@@ -16,18 +16,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.contact import LAWS
-from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array
+from stiffdice.dynamics.state import TOUCHING, TURNING
 from stiffdice.errors import InputError
-from stiffdice.experiments import options
-from stiffdice.experiments.layout import CONTACT, Variable, enum, of_cells, quantity
+from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity
 from stiffdice.experiments.placement import STARTS, at_clearance, clearance, contact_frequency, fall_speed, relaunched
 from stiffdice.integrators.linear_stability import fewest_steps, half_turn_steps
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
+from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.outcome import BLOW_UP, Verdict
 from stiffdice.simulation.run import Run, simulate
 
@@ -48,8 +46,8 @@ def _with_radius(scene: Scene, radius: float) -> Scene:
 
 
 def _with_spin(scene: Scene, rate: float) -> Scene:
-    x, y, z = (float(part) for part in _SPIN_ABOUT * rate * scene.cube.moment_of_inertia)
-    return relaunched(scene, angular_momentum=(x, y, z))
+    momentum = _SPIN_ABOUT * rate * scene.cube.moment_of_inertia
+    return relaunched(scene, angular_momentum=tuple(momentum.tolist()))
 
 
 def _with_ground(key: str) -> Callable[[Scene, float], Scene]:
@@ -57,41 +55,26 @@ def _with_ground(key: str) -> Callable[[Scene, float], Scene]:
 
 
 class Axis(NamedTuple):
-    """One number of a scene, its values, and how a scene gets one of them. kept: what does not change with it."""
+    """One number of a scene, its values, and how a scene gets one of them, all else as it was."""
 
     long_name: str
     units: str
-    values: Sequence[float]
-    placed: Callable[[Scene, float], Scene]
-    kept: str
+    values: Sequence[Any]
+    placed: Callable[[Scene, Any], Scene]
 
 
 def _decades(first: int, last: int) -> list[float]:
     return [float(f"1e{exponent}") for exponent in range(first, last + 1)]
 
 
-_ALL_ELSE = "all else as in the scene"
-
 AXES: dict[str, Axis] = {
-    "stiffness": Axis("ground stiffness", "kg s-2", [0.0, *_decades(-6, 16)], _with_ground("stiffness"), _ALL_ELSE),
-    "damping": Axis("ground damping", "kg s-1", [0.0, *_decades(-3, 12)], _with_ground("damping"), _ALL_ELSE),
-    "friction": Axis("friction coefficient", "1", [0.0, *_decades(-3, 3)], _with_ground("friction"), _ALL_ELSE),
-    "mass": Axis("mass of the cube", "kg", _decades(-9, 9), _with_mass, "ground and launch as in the scene"),
-    "radius": Axis(
-        "radius of the cube, exact geometry",
-        "m",
-        _decades(-9, 9),
-        _with_radius,
-        "the launch keeps its velocity and the height of the lowest node above the ground",
-    ),
-    "spin": Axis("rate of spin at the launch", "rad s-1", [0.0, *_decades(-2, 12)], _with_spin, "its axis"),
-    "start": Axis(
-        "start",
-        "1",
-        range(len(STARTS)),
-        lambda scene, value: list(STARTS.values())[int(value)](scene),
-        "all but `launch` start without motion: lowest node as at rest, touching, half a side deep, three sides deep",
-    ),
+    "stiffness": Axis("ground stiffness", "kg s-2", [0.0, *_decades(-6, 16)], _with_ground("stiffness")),
+    "damping": Axis("ground damping", "kg s-1", [0.0, *_decades(-3, 12)], _with_ground("damping")),
+    "friction": Axis("friction coefficient", "1", [0.0, *_decades(-3, 3)], _with_ground("friction")),
+    "mass": Axis("mass of the cube", "kg", _decades(-9, 9), _with_mass),
+    "radius": Axis("radius of the cube, exact geometry", "m", _decades(-9, 9), _with_radius),
+    "spin": Axis("rate of spin at the launch", "rad s-1", [0.0, *_decades(-2, 12)], _with_spin),
+    "start": Axis("start", "1", list(STARTS), lambda scene, name: STARTS[name](scene)),
 }
 
 # About two a decade, and but for the ends not round: a step that is a whole fraction of all else in a scene is special.
@@ -115,47 +98,51 @@ def measure(
     axis: a name of AXES. values: of that axis, in its units; its own if none are given, and always for `start`.
     budget: most steps to compute one by one for a run; one that needs more is undecided.
     Dimensions contact, value, steps; theory's limits have limit, contact, value.
-
     Raises InputError for an unknown name, a number out of range, and a spin of a cube that does not turn.
     """
     chosen = AXES[validation.choice("axis", axis, AXES)]
-    validation.choice("model", model, MODELS)
     if axis == "spin" and model not in TURNING & TOUCHING:
         raise InputError(f"model = {model}: allowed for axis spin is {' or '.join(sorted(TURNING & TOUCHING))}")
     if axis == "start" and values:
         raise InputError("values: not for axis start, whose values have names")
-    span = options.numbers("values", values, chosen.units) or list(chosen.values)
-    counts = options.counts("steps", steps)
+    span = numbers("values", values, chosen.units) or chosen.values
+    counts = [validation.count("steps", value) for value in steps]
     budget = validation.count("budget", budget)
-    placed = [[chosen.placed(scene.with_ground(contact=law), value) for value in span] for law in LAWS]
-    runs = [[[_run(there, model, count, budget) for count in counts] for there in row] for row in placed]
-    attributes = dataset.provenance_attributes(
-        f"Verdicts from nothing to far beyond use: {axis}", scene, model, SCHEME, __name__
-    )
-    attributes |= {
+
+    def placed(law: str, value: Any) -> Scene:
+        return chosen.placed(scene.with_ground(contact=law), value)
+
+    def verdict(law: str, value: Any, steps: int) -> list[np.int8]:
+        return [_verdict(placed(law, value), model, steps, budget)]
+
+    grid: dict[str, Any] = {"contact": LAWS, "value": span}
+    found = mapped(verdict, {"verdict": ("verdict", "1")}, **grid, steps=counts)
+    found["verdict"][2].update(dataset.VERDICT_ATTRIBUTES)
+    found["value"][2].update(long_name=chosen.long_name, units=chosen.units)
+    limits = [[_limits(placed(law, value), model) for value in span] for law in LAWS]
+    text = "steps at a limit by theory: fewest for contact, drag, turn, most for stall"
+    found["limit_steps"] = quantity(("limit", *grid), np.moveaxis(np.array(limits), -1, 0), text)
+    found |= coordinates(limit=LIMITS)
+    title = f"Verdicts from nothing to far beyond use: {axis}"
+    attributes = dataset.provenance_attributes(title, scene, model, SCHEME, __name__) | {
         "axis": axis,
-        "kept": chosen.kept,
         "budget": budget,
-        "criteria": dataset.criteria_text(runs[0][0][0].tolerances),
+        "criteria": dataset.criteria_text(tolerances_of(model)),
         "scene_note": f"contact law and {axis} are the cell's, not the scene's",
     }
-    coordinates = {
-        "contact": CONTACT,
-        "value": enum("value", list(STARTS), chosen.long_name)
-        if axis == "start"
-        else quantity("value", np.array(span, float), chosen.long_name, chosen.units),
-        "steps": of_cells("steps", counts),
-        "limit": enum("limit", LIMITS, "limit by theory"),
-    }
-    return xr.Dataset(_variables(model, counts, placed, runs), coordinates, attributes)
+    return xr.Dataset(found, attrs=attributes)
+
+
+def _verdict(scene: Scene, model: str, steps: int, budget: int) -> np.int8:
+    if scene.ground.friction > 0 and model not in TURNING and _only_takes(scene, steps):
+        twin = _run(scene.with_ground(friction=0.0), model, steps, budget)
+        gained = twin.measures["energy_ratio"][0] > 1 + 1e-9
+        if not gained and twin.verdict[0] != Verdict.UNDECIDED:
+            return twin.verdict[0]
+    return _run(scene, model, steps, budget).verdict[0]
 
 
 def _run(scene: Scene, model: str, steps: int, budget: int) -> Run:
-    if scene.ground.friction > 0 and model not in TURNING:
-        twin = _run(scene.with_ground(friction=0.0), model, steps, budget)
-        gained = twin.measures["energy_ratio"][0] > 1 + 1e-9
-        if _only_takes(scene, steps) and not gained and twin.verdict[0] != Verdict.UNDECIDED:
-            return twin
     return simulate(scene, model=model, scheme=SCHEME, steps=steps, stop={"energy": BLOW_UP - 1.0}, budget=budget)
 
 
@@ -190,38 +177,3 @@ def _limits(scene: Scene, model: str) -> list[float]:
     height, speed = abs(normal @ scene.launch.position), abs(normal @ scene.launch.velocity)
     stall = 2 * speed * scene.duration / np.spacing(height)
     return [part if part > 0 else math.nan for part in (contact, drag, turn, float(stall))]
-
-
-def _variables(
-    model: str, counts: Sequence[int], placed: Sequence[Sequence[Scene]], runs: Sequence[Sequence[Sequence[Run]]]
-) -> dict[str, Variable]:
-    """Return what came of the runs, by contact, value and steps, and the limits by theory."""
-    grid = ("contact", "value", "steps")
-
-    def of_runs(kind: type, value_of: Callable[[Run], Any]) -> Array:
-        return np.array([[[value_of(run)[0] for run in row] for row in part] for part in runs], kind)
-
-    omega_h = [[linear_theory.omega_h(there, count) for count in counts] for there in placed[0]]
-    limits = np.array([[_limits(there, model) for there in row] for row in placed])
-    return {
-        "verdict": (grid, of_runs(np.int8, lambda run: run.verdict), dataset.VERDICT_ATTRIBUTES),
-        "steps_done": (grid, of_runs(np.int64, lambda run: run.steps_done), dataset.STEPS_DONE_ATTRIBUTES),
-        "steps_computed": (
-            grid,
-            of_runs(np.int64, lambda run: run.steps_computed),
-            dataset.STEPS_COMPUTED_ATTRIBUTES,
-        ),
-        "omega_h": of_cells("omega_h", omega_h, grid[1:]),
-        "limit_steps": quantity(
-            ("limit", *grid[:2]),
-            np.moveaxis(limits, -1, 0),
-            "steps at a limit by theory: fewest for contact, drag, turn, most for stall",
-        ),
-    } | {
-        name: (grid, of_runs(float, _measure_of(name)), dataset.MEASURE_ATTRIBUTES[name])
-        for name in ("energy_ratio", "apex_ratio")
-    }
-
-
-def _measure_of(name: str) -> Callable[[Run], Array]:
-    return lambda run: run.measures[name]

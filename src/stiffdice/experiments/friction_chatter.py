@@ -16,14 +16,12 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments import options
-from stiffdice.experiments.layout import quantity
+from stiffdice.experiments.measuring import mapped, numbers
 from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
-from stiffdice.experiments.sampling import states_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.run import simulate
+from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -33,6 +31,12 @@ _LAST = 200
 # ωh of the cube on its ground: above, the bounce is unstable, too.
 _LONGEST = 1.5
 
+_SWINGS = {
+    "swing": ("largest sliding speed of a cube at rest", "m s-1"),
+    "swing_theory": ("mu g h/2 - cutoff, or nothing", "m s-1"),
+}
+_LEAST = {"least_step": ("step size from which on a cube at rest chatters, 2 cutoff/(mu g)", "s")}
+
 
 def measure(
     scene: Scene,
@@ -41,18 +45,16 @@ def measure(
     step_size: Sequence[float] = tuple(np.logspace(-8, -2.5, 23)),
     steps: int = 4000,
 ) -> xr.Dataset:
-    """Return the swing of the sliding speed of a cube at rest [m/s], measured and by theory.
+    """Return the swing of the sliding speed of a cube at rest [m/s], measured and by theory, and `least_step` [s].
 
-    scene: gives the cube, gravity, stiffness and damping; the experiment puts the cube at rest on level ground under
-    the gated law, sliding at first with three steps' friction. friction: coefficients. step_size [s]: up to ωh = 1.5.
-    steps: how many are taken, and more where the swing needs them to settle; it is that of the last 200.
-    Dimensions friction, step_size; `least_step` has friction: the step size from which on theory says it chatters.
-
+    scene: gives the cube, gravity, stiffness and damping; the cube rests on level ground under the gated law, sliding
+    at first with three steps' friction. friction: coefficients. step_size [s]: up to ωh = 1.5. steps: how many are
+    taken, and more where the swing needs them to settle; it is that of the last 200. Dimensions friction, step_size.
     Raises InputError for a number out of range, and for a scene in which the cube does not rest on four nodes.
     """
-    coefficients = options.numbers("friction", friction, "1", above=0)
+    coefficients = numbers("friction", friction, "1", above=0)
     steps = validation.count("steps", steps, at_least=2 * _LAST)
-    flat = level(scene)
+    flat, cutoff = level(scene), physics_of(scene).cutoff
     stiffness, weight = scene.ground.stiffness, scene.cube.mass * scene.gravity
     if not 0 < weight < linear_theory.BOUNCE_NODES * stiffness * scene.cube.side / 2:
         raise InputError(
@@ -60,29 +62,18 @@ def measure(
             "rests on its lower face"
         )
     longest = _LONGEST / contact_frequency(scene)
-    sizes = options.numbers("step_size", step_size, "s", above=0)
-    if max(sizes) > longest:
+    sizes = numbers("step_size", step_size, "s", above=0)
+    if max(sizes, default=0) > longest:
         raise InputError(f"step_size = {max(sizes):g}: allowed are numbers <= {longest:.3g} [s], ωh = {_LONGEST:g}")
-    cutoff = physics_of(scene).cutoff
-    theoretical = np.array([[max(0.0, mu * scene.gravity * h / 2 - cutoff) for h in sizes] for mu in coefficients])
-    swings = [[_swing(flat, mu, h, steps) for h in sizes] for mu in coefficients]
-    least = [2 * cutoff / (mu * scene.gravity) for mu in coefficients]
-    grid = ("friction", "step_size")
+
+    def swings(mu: float, h: float) -> tuple[float, float]:
+        return _swing(flat, mu, h, steps), max(0.0, mu * scene.gravity * h / 2 - cutoff)
+
+    found = mapped(swings, _SWINGS, friction=coefficients, step_size=sizes)
+    found |= mapped(lambda mu: [2 * cutoff / (mu * scene.gravity)], _LEAST, friction=coefficients)
     attributes = dataset.provenance_attributes("Chatter of a cube at rest", flat, MODEL, SCHEME, __name__)
-    return xr.Dataset(
-        {
-            "swing": quantity(grid, swings, "largest sliding speed of a cube at rest", "m s-1"),
-            "swing_theory": quantity(grid, theoretical, "mu g h/2 - cutoff, or nothing", "m s-1"),
-            "least_step": quantity(
-                "friction", least, "step size from which on a cube at rest chatters, 2 cutoff/(mu g)", "s"
-            ),
-        },
-        {
-            "friction": quantity("friction", coefficients, "friction coefficient"),
-            "step_size": quantity("step_size", sizes, "step size", "s"),
-        },
-        attributes | {"scene_note": "friction and launch are the experiment's, not the scene's; ground: level, gated"},
-    )
+    note = "friction and launch are the experiment's, not the scene's; ground: level, gated"
+    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
 
 
 def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
@@ -91,5 +82,5 @@ def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
     steps += round(2.5 * friction * flat.gravity * h / physics_of(flat).cutoff)
     still = STARTS["at_rest"](flat.with_ground(friction=friction))
     sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
-    run = simulate(dataclasses.replace(sliding, duration=h * steps), model=MODEL, scheme=SCHEME, steps=steps, every=1)
-    return float(np.abs(states_of(run, steps)["velocity"][-_LAST:, 0]).max())
+    start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * steps), MODEL, steps, steps)
+    return float(np.abs(start()().states["velocity"][-_LAST:, 0]).max())

@@ -8,24 +8,21 @@ is itself.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.state import STATE, Array, Ensemble, States
-from stiffdice.experiments import options
-from stiffdice.experiments.layout import of_cells, quantity
+from stiffdice.dynamics.state import STATE, Array
+from stiffdice.experiments.measuring import coordinates, mapped, numbers
 from stiffdice.experiments.placement import relaunched
-from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import scipy_ivp
+from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.initial_conditions import turned
-from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "tumbling", "event"
 
@@ -34,6 +31,13 @@ SAMPLES = 12
 
 # Of LSODA: what is taken for right, and what tells how right it is.
 _REFERENCE, _COARSER = 1e-13, 1e-12
+
+_DESCRIBED = {
+    "error": ("root mean square distance of the centre's path from LSODA's, in radii", "1", "tolerance"),
+    "evaluations": ("evaluations of the force", "1", "tolerance"),
+    "reference_error": ("the same of LSODA's path at ten times the tolerance", "1"),
+    "reference_evaluations": ("evaluations by LSODA", "1"),
+}
 
 
 def measure(
@@ -52,61 +56,30 @@ def measure(
     times its tolerance from its own; both are not-a-number where LSODA did not arrive. Raises InputError for a number
     out of range.
     """
-    coefficients = options.numbers("friction", friction, "1", at_least=0)
-    grounds = options.stiffnesses(stiffness)
-    tolerances = options.numbers("tolerance", tolerance, "1", at_least=schemes.FINEST)
-    launches = validation.count("launches", launches)
+    axes: dict[str, Any] = {
+        "friction": numbers("friction", friction, "1", at_least=0),
+        "stiffness": numbers("stiffness", stiffness, "kg/s²", above=0),
+        "launch": range(validation.count("launches", launches)),
+    }
+    tolerances = numbers("tolerance", tolerance, "1", at_least=schemes.FINEST)
     scene = relaunched(scene.with_ground(contact="gated"), node_velocity="rigid")
     starts = turned(scene, MODEL, launches)
-    shape = len(coefficients), len(grounds), launches
-    error, evaluations = np.full((*shape, len(tolerances)), np.nan), np.zeros((*shape, len(tolerances)), np.int64)
-    reference_error, reference_evaluations = np.full(shape, np.nan), np.zeros(shape, np.int64)
-    for i, j, k in np.ndindex(shape):
-        rough = scene.with_ground(friction=coefficients[i], stiffness=grounds[j])
-        start = starts[k : k + 1]
-        right, reference_evaluations[i, j, k] = _by_lsoda(rough, start, _REFERENCE)
-        reference_error[i, j, k] = _apart(rough, _by_lsoda(rough, start, _COARSER)[0], right)
-        for t, size in enumerate(tolerances):
-            path, evaluations[i, j, k, t] = _by_event(rough, start, size)
-            error[i, j, k, t] = _apart(rough, path, right)
-    grid = ("friction", "stiffness", "launch")
-    by_tolerance = (*grid, "tolerance")
-    attributes = dataset.provenance_attributes(
-        "Corners held by friction", scene, MODEL, SCHEME, __name__, scipy_ivp.__name__
-    )
-    return xr.Dataset(
-        {
-            "error": quantity(
-                by_tolerance, error, "root mean square distance of the centre's path from LSODA's, in radii"
-            ),
-            "evaluations": (by_tolerance, evaluations, dataset.EVALUATIONS_ATTRIBUTES),
-            "reference_error": quantity(grid, reference_error, "the same of LSODA's path at ten times the tolerance"),
-            "reference_evaluations": quantity(grid, reference_evaluations, "evaluations by LSODA"),
-        },
-        {
-            "friction": quantity("friction", coefficients, "friction coefficient"),
-            "stiffness": of_cells("stiffness", grounds),
-            "launch": quantity("launch", np.arange(launches), "orientation of the launch, 0 the scene's"),
-            "tolerance": quantity("tolerance", tolerances, "tolerance of the scheme event"),
-        },
-        attributes | {"scene_note": "friction, stiffness and orientation are those of the dimensions"},
-    )
 
+    def compared(friction: float, stiffness: float, launch: int) -> tuple[Array, Any, float, int]:
+        rough, start = scene.with_ground(friction=friction, stiffness=stiffness), starts[launch : launch + 1]
 
-def _by_lsoda(scene: Scene, launch: States, tolerance: float) -> tuple[Array, int]:
-    """Return the centre's places [m], shape (SAMPLES, 3), and evaluations."""
-    states = np.zeros(SAMPLES, STATE)
-    run = scipy_ivp.Lsoda(scene, MODEL, launch, scene.duration / SAMPLES, tolerance)
-    evaluations = run.advance(states, 1)
-    return states["position"], evaluations
+        def path(method: str, size: float) -> tuple[Array, int]:
+            states = np.zeros(SAMPLES, STATE)
+            evaluations = stepper.start(method, rough, MODEL, start, scene.duration / SAMPLES, size).advance(states, 1)
+            return states["position"], evaluations
 
+        right, reference = path("scipy", _REFERENCE)
+        paths, counts = zip(*(path(SCHEME, size) for size in tolerances), strict=True)
+        away = np.array([*paths, path("scipy", _COARSER)[0]]) - right
+        apart = np.sqrt((away**2).sum(axis=-1).mean(axis=-1)) / scene.cube.radius
+        return apart[:-1], counts, apart[-1], reference
 
-def _by_event(scene: Scene, launch: States, tolerance: float) -> tuple[Array, int]:
-    """Return the same by `event`."""
-    members = Ensemble(launch, np.zeros(1))
-    run = simulate(scene, model=MODEL, scheme=SCHEME, steps=SAMPLES, every=1, tolerance=tolerance, members=members)
-    return states_of(run, SAMPLES)["position"][1:], int(run.evaluations[0])
-
-
-def _apart(scene: Scene, one: Array, other: Array) -> float:
-    return math.sqrt(float(((one - other) ** 2).sum(axis=1).mean())) / scene.cube.radius
+    found = mapped(compared, _DESCRIBED, **axes) | coordinates(tolerance=tolerances)
+    attributes = dataset.provenance_attributes("Corners held by friction", scene, MODEL, SCHEME, __name__)
+    note = "friction, stiffness and orientation are those of the dimensions"
+    return xr.Dataset(found, attrs=attributes | {"scene_note": note})

@@ -45,8 +45,7 @@ def at_clearance(scene: Scene, height: float) -> Scene:
     normal, place = np.array(scene.ground.normal), np.array(scene.launch.position)
     # The height anew, not a difference: it shall be exact to the last bit on level ground.
     height -= float((start_of(scene, "sliding")["node_offset"][0] @ normal).min())
-    x, y, z = (float(part) for part in place - normal * (normal @ place) + normal * height)
-    return relaunched(scene, position=(x, y, z))
+    return relaunched(scene, position=tuple((place - normal * (normal @ place) + normal * height).tolist()))
 
 
 def _still(scene: Scene, height: float) -> Scene:

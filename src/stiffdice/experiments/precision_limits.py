@@ -18,8 +18,7 @@ import xarray as xr
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.bisection import bisected, geometric
-from stiffdice.experiments.layout import enum, quantity
+from stiffdice.experiments.measuring import bisected, coordinates, quantity
 from stiffdice.experiments.placement import STARTS, contact_frequency, fall_speed, height_above, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -30,19 +29,6 @@ from stiffdice.simulation.run import Run, simulate
 MODEL, SCHEME = "sliding", "symplectic_euler"
 LARGEST = float(np.finfo(float).max)
 
-# By limit: what is stored of it, and its unit.
-LIMITS: dict[str, tuple[str, str]] = {
-    "spring_at_rest": ("stiffness from which the springs' energy at rest is lost in m g z", "kg s-2"),
-    "sag_in_height": ("stiffness from which the sag at rest is lost in the height", "kg s-2"),
-    "spring_at_deepest": ("springs' energy at the deepest point of the landing, in units in the last place", "1"),
-    "way_in_place": ("step size up to which a step at the launch's speed is lost in its height", "s"),
-    "pull_in_speed": ("step size up to which a step's gravity is lost in the launch's speed", "s"),
-    "first_fall": ("step size up to which a cube let go from rest does not begin to fall", "s"),
-    "growth": ("factor by which round-off grows in a bounce", "1"),
-    "square_of_frequency": ("stiffness from which omega^2 leaves the range of doubles", "kg s-2"),
-    "first_contact": ("stiffness from which the first contact of a coarse run leaves the range of doubles", "kg s-2"),
-}
-
 # Units in the last place between the launches of a pair: one may be lost where the flight goes higher.
 _APART = 16
 
@@ -52,13 +38,11 @@ Found = tuple[float, float]  # predicted, measured
 def measure(
     scene: Scene, *, stiffness: float = 1.0e6, omega_h: float = 0.3, coarse: int = 10, members: int = 64
 ) -> xr.Dataset:
-    """Return LIMITS of a scene, predicted and measured; dimension limit.
+    """Return limits of a scene on level ground, gated, without damping and friction, predicted and measured.
 
     stiffness [kg/s²], omega_h [1]: of the bounces through which round-off is followed. coarse: in so many steps of the
     scene's duration the run begins whose first contact is to leave the range. members: pairs of runs, spread over the
-    phase of the touch-down, whose growth is averaged in its logarithm.
-    The experiment puts the cube on level ground, gated, without damping and friction.
-
+    phase of the touch-down, whose growth is averaged in its logarithm. Dimension limit.
     Raises InputError for a number out of range and for a scene without gravity, or not launched up from above the
     ground.
     """
@@ -66,40 +50,39 @@ def measure(
     omega_h = validation.number("omega_h", omega_h, "1", above=0)
     coarse, members = validation.count("coarse", coarse), validation.count("members", members)
     bare = level(scene, damping=0.0, friction=0.0)
-    if not (bare.gravity > 0 and bare.launch.velocity[2] > 0 and height_above(bare) > 0 and omega_h < 1):
+    (_, _, z), (_, _, up), gravity, mass = bare.launch.position, bare.launch.velocity, bare.gravity, bare.cube.mass
+    if not (gravity > 0 and up > 0 and height_above(bare) > 0 and omega_h < 1):
         raise InputError("allowed are launches up from above the ground, under gravity, and omega_h < 1")
-    stiff = bare.with_ground(stiffness=stiffness)
-    found: dict[str, Found] = {
-        "spring_at_rest": _spring_at_rest(bare),
-        "sag_in_height": _sag_in_height(bare),
-        "spring_at_deepest": _spring_at_deepest(stiff),
-        "way_in_place": _way_in_place(bare),
-        "pull_in_speed": _pull_in_speed(bare),
-        "first_fall": _first_fall(bare),
-        "growth": _growth(stiff, omega_h, members),
-        "square_of_frequency": _square_of_frequency(bare),
-        "first_contact": _first_contact(bare, coarse),
+    stiff, still = bare.with_ground(stiffness=stiffness), relaunched(bare, velocity=(0.0, 0.0, 0.0))
+    # Each has a unit of its own, which no `units` could say of all.
+    found: dict[str, tuple[str, Found]] = {
+        "spring_at_rest": ("kg s-2", _spring_at_rest(bare)),
+        "sag_in_height": ("kg s-2", _sag_in_height(bare)),
+        "spring_at_deepest": ("1", _spring_at_deepest(stiff)),
+        "way_in_place": ("s", _unchanged(bare, "position", float(np.spacing(z)) / 2 / up)),
+        "pull_in_speed": ("s", _unchanged(bare, "velocity", _half_unit(up) / gravity)),
+        # The first step falls by g h².
+        "first_fall": ("s", _unchanged(still, "position", math.sqrt(_half_unit(z) / gravity))),
+        "growth": ("1", _growth(stiff, omega_h, members)),
+        "square_of_frequency": (
+            "kg s-2",
+            _found(LARGEST / 4 * mass, lambda stiffness: 4 * stiffness / mass < math.inf),
+        ),
+        "first_contact": ("kg s-2", _first_contact(bare, coarse)),
     }
-    predicted, measured = zip(*(found[name] for name in LIMITS), strict=True)
-    # Each limit has a unit of its own, which no `units` could say of all.
-    unit = "in the unit that limit_units names"
-    attributes = dataset.provenance_attributes("Limits of double precision", bare, MODEL, SCHEME, __name__)
-    attributes |= {
+    predicted, measured = zip(*(pair for _, pair in found.values()), strict=True)
+    variables = coordinates(limit=found) | {
+        "predicted": quantity("limit", list(predicted), "limit by its formula, in the unit that limit_units names"),
+        "measured": quantity("limit", list(measured), "limit found in this code, in the unit that limit_units names"),
+    }
+    attributes = dataset.provenance_attributes("Limits of double precision", bare, MODEL, SCHEME, __name__) | {
         "scene_note": "ground: level, gated, without damping and friction; stiffness as the limit says",
-        "limit_meanings": "; ".join(f"{name}: {what}" for name, (what, _) in LIMITS.items()),
-        "limit_units": "; ".join(f"{name}: {units}" for name, (_, units) in LIMITS.items()),
+        "limit_units": "; ".join(f"{name}: {unit}" for name, (unit, _) in found.items()),
         "bounce_stiffness": stiffness,
         "bounce_omega_h": omega_h,
         "coarse": coarse,
     }
-    return xr.Dataset(
-        {
-            "predicted": quantity("limit", list(predicted), f"limit by its formula, {unit}"),
-            "measured": quantity("limit", list(measured), f"limit found in this code, {unit}"),
-        },
-        {"limit": enum("limit", list(LIMITS), "limit")},
-        attributes,
-    )
+    return xr.Dataset(variables, attrs=attributes)
 
 
 def _half_unit(value: float) -> float:
@@ -107,11 +90,12 @@ def _half_unit(value: float) -> float:
     return float(value - np.nextafter(value, 0.0)) / 2
 
 
-def _edge(holds: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the number from low to high up to which `holds` is true, to nine digits."""
+def _found(predicted: float, holds: Callable[[float], bool], factor: float = 1e3) -> Found:
+    """Return a limit and the number up to which `holds` is true, to nine digits, within a factor of it."""
+    low, high = predicted / factor, min(predicted * factor, LARGEST)
     assert holds(low)
     assert not holds(high)
-    return bisected(holds, low, high, relative=1e-9, middle_of=geometric)[0]
+    return predicted, bisected(holds, low, high, relative=1e-9, logarithmic=True)[0]
 
 
 def _run(scene: Scene, h: float, steps: int, every: int | None = None) -> Run:
@@ -130,7 +114,7 @@ def _spring_at_rest(scene: Scene) -> Found:
         sag = weight / 4 / stiffness
         return bool(potential[0] - 4 * (stiffness * sag * sag / 2) != potential[0])
 
-    return predicted, _edge(shows, predicted / 1e6, predicted * 1e6)
+    return _found(predicted, shows, 1e6)
 
 
 def _sag_in_height(scene: Scene) -> Found:
@@ -141,7 +125,7 @@ def _sag_in_height(scene: Scene) -> Found:
         ground = scene.with_ground(stiffness=stiffness)
         return STARTS["at_rest"](ground).launch.position != STARTS["touching"](ground).launch.position
 
-    return predicted, _edge(shows, predicted / 1e6, predicted * 1e6)
+    return _found(predicted, shows, 1e6)
 
 
 def _spring_at_deepest(scene: Scene) -> Found:
@@ -166,21 +150,7 @@ def _landing(scene: Scene) -> Found:
 def _unchanged(scene: Scene, part: str, predicted: float) -> Found:
     """Return up to which step size [s] a step leaves the vertical part of the launch as it is."""
     value = getattr(scene.launch, part)[2]
-    return predicted, _edge(lambda h: _run(scene, h, 1).end[part][0, 2] == value, predicted / 1e3, predicted * 1e3)
-
-
-def _way_in_place(scene: Scene) -> Found:
-    return _unchanged(scene, "position", float(np.spacing(scene.launch.position[2])) / 2 / scene.launch.velocity[2])
-
-
-def _pull_in_speed(scene: Scene) -> Found:
-    return _unchanged(scene, "velocity", _half_unit(scene.launch.velocity[2]) / scene.gravity)
-
-
-def _first_fall(scene: Scene) -> Found:
-    """The first step falls by g h²."""
-    still = relaunched(scene, velocity=(0.0, 0.0, 0.0))
-    return _unchanged(still, "position", math.sqrt(_half_unit(still.launch.position[2]) / scene.gravity))
+    return _found(predicted, lambda h: _run(scene, h, 1).end[part][0, 2] == value)
 
 
 def _growth(scene: Scene, omega_h: float, members: int) -> Found:
@@ -214,11 +184,6 @@ def _apart(scene: Scene, height: float, h: float, steps: int) -> float:
     return float(abs(ends[1] - ends[0]))
 
 
-def _square_of_frequency(scene: Scene) -> Found:
-    mass = scene.cube.mass
-    return LARGEST * mass / 4, _edge(lambda stiffness: 4 * stiffness / mass < math.inf, 1.0, LARGEST)
-
-
 def _first_contact(scene: Scene, coarse: int) -> Found:
     """The sum of all S d must be in range, and place and speed after the step of h/m times that, added."""
     h, up, low = scene.duration / coarse, scene.launch.velocity[2], height_above(scene)
@@ -235,4 +200,4 @@ def _first_contact(scene: Scene, coarse: int) -> Found:
         run = _run(scene.with_ground(stiffness=stiffness), h, steps + 1)
         return bool(run.verdict[0] != Verdict.LEFT_NUMERIC_RANGE)
 
-    return predicted, _edge(inside, predicted / 1e3, min(predicted * 1e3, LARGEST))
+    return _found(predicted, inside)

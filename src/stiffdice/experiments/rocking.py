@@ -2,16 +2,14 @@
 
 Measured twice, on the compiled step itself. Linearised: a cube is pressed lightly into the ground on four, two or one
 of its nodes, and finite differences around that state give the linear map of one step; its spectral radius passes one
-at the limit. In time: a cube at rest on its face is nudged, and what becomes of the nudge is followed step by step
-while it is small against the sag. Above the limit that is for some ten steps; below it, too, for rocking with `corners`
-inertia, because at such a step the bounce is unstable and soon takes over. (A bounce of a `solid` cube stays alone
-where rocking is unstable: the torques of four nodes cancel to the last bit.)
+at the limit. In time: a cube at rest on its face is nudged, and the nudge is followed while it is small against the
+sag: for some ten steps above the limit, or wherever another mode is unstable.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,17 +22,14 @@ from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments import options
-from stiffdice.experiments.bisection import bisected
-from stiffdice.experiments.layout import Variable, enum, quantity
+from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers
 from stiffdice.experiments.placement import level
-from stiffdice.experiments.sampling import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
 from stiffdice.scene.scene import Launch, Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.run import simulate
+from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
 _TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
@@ -67,6 +62,14 @@ _SAGS = 1e-7, 1e-1
 # ωh in units of its limit. Slower, a run's steps show too little of a swing; faster, the nudge is out of hand at once.
 _SCAN = 0.5, 1.15
 
+_LIMITS = {
+    "mode_number": ("k of omega^2 = k S/m, as the step shows it", "1"),
+    "mode_number_theory": ("k of omega^2 = k S/m by theory", "1"),
+    "limit": ("omega h at which one step's spectral radius passes 1; omega of the mode by theory", "1", "zeta"),
+    "longest_step": ("step size h at the measured limit, as h sqrt(S/m)", "1", "zeta"),
+}
+_GROWTH = {"growth": ("factor by which a nudge to the cube at rest grows in a step", "1")}
+
 
 def measure(
     scene: Scene,
@@ -78,91 +81,41 @@ def measure(
 ) -> xr.Dataset:
     """Return the measured limits of all modes, and the growth of a nudge around two of them.
 
-    scene: gives the cube's size and mass, the stiffness and gravity; the experiment sets inertia, damping and launch,
-    and puts the cube on level ground without friction under the gated law. zeta: damping ratios ζ = (D/S) ω/2 of each
-    mode itself, up to 1, for the linearised step. nudge_zeta, omega_h_relative, steps: damping ratios, ωh in units of
-    its limit, and steps at most for the nudged cube.
-    Dimensions inertia, mode, zeta; and inertia, nudge, nudge_zeta, omega_h_relative.
-    Relative accuracy: limits 2.5e-7, stored as `limit_error`; growth, but for the limit itself, 1e-6 for a sag of
-    2e-6 to 2e-4 of the side, 6e-4 on the softest ground that is allowed, 2e-5 on the hardest.
-
+    scene: gives the cube's size and mass, the stiffness and gravity. zeta: damping ratios ζ = (D/S) ω/2 of each mode
+    itself, up to 1, for the linearised step. nudge_zeta, omega_h_relative, steps: damping ratios, ωh in units of its
+    limit, and steps at most for the nudged cube.
+    Dimensions inertia, mode, zeta; and inertia, nudge, nudge_zeta, omega_h_relative. Relative accuracy: limits 2.5e-7;
+    growth, but for the limit itself, 1e-6 for a sag of 2e-6 to 2e-4 of the side, else at most 6e-4.
     Raises InputError for a number out of range and for a scene in which the cube sinks too far or too little to nudge.
     """
     zeta = _numbers("zeta", zeta, 0.0, 1.0)
     nudge_zeta = _numbers("nudge_zeta", nudge_zeta, 0.0, 1.0)
     scan = _numbers("omega_h_relative", omega_h_relative, *_SCAN)
     steps = validation.count("steps", steps, at_least=20)
-    grounds = [_on_level_ground(scene, inertia) for inertia in INERTIAS]
-    modes = [{name: _mode(ground, name) for name in _TILTS} for ground in grounds]
-    limits = np.array([[[_limit(mode, value) for value in zeta] for mode in row.values()] for row in modes])
-    nudged = np.empty((len(INERTIAS), len(NUDGES), len(nudge_zeta), len(scan), 2))
-    for i, ground in enumerate(grounds):
-        for k, name in enumerate(NUDGES.values()):
-            nudged[i, k] = [
-                [_nudged(ground, modes[i][name], value, part, steps) for part in scan] for value in nudge_zeta
-            ]
+    grounds = {inertia: _on_level_ground(scene, inertia) for inertia in INERTIAS}
+    modes = {(inertia, name): _mode(ground, name) for inertia, ground in grounds.items() for name in _TILTS}
+    unit = scene.ground.stiffness / scene.cube.mass  # of ω² [rad²/s²]
+
+    def limits(inertia: str, name: str) -> tuple[float, float, Array, Array]:
+        mode = modes[inertia, name]
+        h = np.array([_limit(mode, value) for value in zeta])
+        return mode.square / unit, mode.predicted / unit, h * np.sqrt(mode.predicted), h * np.sqrt(unit)
+
+    def growth(inertia: str, nudge: str, value: float, relative: float) -> list[float]:
+        return [_growth(_nudged(grounds[inertia], modes[inertia, NUDGES[nudge]], value, relative, steps))]
+
+    found = coordinates(zeta=zeta) | mapped(limits, _LIMITS, inertia=INERTIAS, mode=_TILTS)
+    found |= mapped(growth, _GROWTH, inertia=INERTIAS, nudge=NUDGES, nudge_zeta=nudge_zeta, omega_h_relative=scan)
     attributes = dataset.provenance_attributes("Limits of the contact modes", scene, MODEL, SCHEME, __name__)
-    attributes["scene_note"] = (
-        "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
-    )
-    coordinates = {
-        "inertia": enum("inertia", INERTIAS, "moment of inertia of the cube"),
-        "mode": enum("mode", list(_TILTS), "contact mode"),
-        "nudge": enum("nudge", list(NUDGES), "nudge to a cube at rest on its face"),
-        "zeta": quantity("zeta", zeta, "damping ratio of the mode itself, (D/S) omega/2"),
-        "nudge_zeta": quantity("nudge_zeta", nudge_zeta, "damping ratio of the nudged motion"),
-        "omega_h_relative": quantity("omega_h_relative", scan, "omega h of the nudged motion over its limit by theory"),
-    }
-    unit = scene.ground.stiffness / scene.cube.mass
-    return xr.Dataset(
-        _limit_variables(modes, zeta, limits, unit) | _growth_variables(nudge_zeta, scan, nudged),
-        coordinates,
-        attributes,
-    )
+    note = "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
+    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
 
 
-def _limit_variables(
-    modes: Sequence[Mapping[str, _Mode]], zeta: Sequence[float], limits: Array, unit: float
-) -> dict[str, Variable]:
-    """Return what was found of the linearised step; unit: S/m [rad²/s²]."""
-    grid = ("inertia", "mode", "zeta")
-    squares, predicted = (
-        np.array([[getattr(mode, name) for mode in row.values()] for row in modes]) for name in ("square", "predicted")
-    )
-    limit = limits * np.sqrt(predicted)[:, :, None]
-    theory = np.array([linear_theory.stability_limit(value) for value in zeta])
-    return {
-        "mode_number": quantity(grid[:2], squares / unit, "k of omega^2 = k S/m, as the step shows it"),
-        "mode_number_theory": quantity(grid[:2], predicted / unit, "k of omega^2 = k S/m by theory"),
-        "limit": quantity(
-            grid, limit, "omega h at which one step's spectral radius passes 1; omega of the mode by theory"
-        ),
-        "limit_theory": quantity("zeta", theory, "2 (sqrt(1 + zeta^2) - zeta)"),
-        "limit_error": quantity(grid, limit / theory - 1, "measured limit over theory, minus 1"),
-        "longest_step": quantity(grid, limits * np.sqrt(unit), "step size h at the measured limit, as h sqrt(S/m)"),
-    }
-
-
-def _growth_variables(zeta: Sequence[float], scan: Sequence[float], nudged: Array) -> dict[str, Variable]:
-    """Return what was found of nudges."""
-    grid = ("inertia", "nudge", "nudge_zeta", "omega_h_relative")
-    limits = [(value, linear_theory.stability_limit(value)) for value in zeta]
-    theory = [[linear_theory.growth(part * limit, value) for part in scan] for value, limit in limits]
-    followed = nudged[..., 1].astype(np.int32)
-    return {
-        "growth": quantity(grid, nudged[..., 0], "factor by which a nudge to the cube at rest grows in a step"),
-        "growth_theory": quantity(grid[2:], theory, "the same by theory"),
-        "steps_followed": quantity(grid, followed, "steps that show it: until a node has moved by 1 % of the sag"),
-    }
-
-
-def _numbers(key: str, values: Sequence[float], smallest: float, largest: float) -> list[float]:
-    numbers = options.numbers(key, values, "1")
-    if not numbers or min(numbers) < smallest or max(numbers) > largest:
-        raise InputError(
-            f"{key} = {validation.shown(values)}: allowed are numbers from {smallest:g} to {largest:g} [1]"
-        )
-    return numbers
+def _numbers(key: str, values: Sequence[float], least: float, most: float) -> list[float]:
+    found = numbers(key, values, "1")
+    if not all(least <= value <= most for value in found):
+        raise InputError(f"{key} = {validation.shown(values)}: allowed are numbers from {least:g} to {most:g} [1]")
+    return found
 
 
 def _on_level_ground(scene: Scene, inertia: str) -> Scene:
@@ -260,13 +213,8 @@ def _mode(scene: Scene, name: str) -> _Mode:
     h = np.sqrt(scene.cube.mass / scene.ground.stiffness)
     stiffness = -_jacobian(contact, 0.0, h)[4:, :4] / h
     squares, shapes = np.linalg.eigh((stiffness + stiffness.T) / 2)
-    bounce = np.argmax(np.abs(shapes[0]))
-    if name == "face_bounce":
-        found = bounce
-    elif name == "face_rocking":
-        found = np.argmax(np.where(np.arange(4) == bounce, 0.0, squares))
-    else:
-        found = np.argmax(squares)
+    bounce = np.arange(4) == np.argmax(np.abs(shapes[0]))
+    found = np.argmax(np.where({"face_bounce": bounce, "face_rocking": ~bounce}.get(name, True), squares, 0.0))
     touching = contact.offsets[:, 2] < contact.offsets[:, 2].min() + _PRELOAD * scene.cube.side
     modes = linear_theory.contact_modes(scene, scene.cube.node_offsets(), touching)
     predicted = modes[np.argmin(np.abs(modes - squares[found]))]
@@ -290,8 +238,8 @@ def _limit(mode: _Mode, zeta: float) -> float:
     return bisected(stable, 0.0, 2 * linear_theory.STABILITY_LIMIT / omega, relative=1e-10)[0]
 
 
-def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> tuple[float, float]:
-    """Return the growth per step [1] of a nudge to the cube at rest, and the number of steps that show it.
+def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> Array:
+    """Return what becomes of a nudge to the cube at rest, [m] or [rad], from step to step while it is small.
 
     zeta, relative: damping ratio, and ωh in units of its limit, of the nudged motion. A cube that is tipped at rest is
     toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I.
@@ -304,28 +252,19 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     lift, tip = (0.0, _NUDGE * sag / half) if tips else (_NUDGE * sag, 0.0)
     launch = Launch(position=(0.0, 0.0, half - sag + lift), velocity=(0.0, 0.0, 0.0), orientation=(tip, 0.0, 0.0))
     damped = scene.with_ground(damping=2 * zeta * omega * scene.ground.stiffness / mode.predicted)
-    run = simulate(
-        dataclasses.replace(damped, launch=launch, duration=h * steps),
-        model=MODEL,
-        scheme=SCHEME,
-        steps=steps,
-        every=1,
-    )
-    state, upright = states_of(run, steps), scene.cube.node_offsets()
+    nudged = dataclasses.replace(damped, launch=launch, duration=h * steps)
+    state, upright = stepper.ready(SCHEME, nudged, MODEL, steps, steps)()().states, scene.cube.node_offsets()
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
-    gone = np.flatnonzero(np.abs(heights + sag).max(axis=1) > _FOLLOWED * sag)
-    last = int(gone[0]) - 1 if gone.size else len(state) - 1
-    return _growth(motion[: last + 1]), last
+    small = np.abs(heights + sag).max(axis=1) <= _FOLLOWED * sag
+    return np.asarray(motion[: len(small) if small.all() else int(np.argmin(small))])
 
 
 def _growth(motion: Array) -> float:
     """Return the factor [1] by which a motion of one mode grows in a step.
 
-    From step to step such a motion follows x₂ = a x₁ − b x₀: a and b by least squares, the growth is the larger
-    modulus of the roots of λ² = aλ − b. Unlike the last amplitude over the first, this does not take for growth what a
-    nudge swings up to in the end, near the limit many times its size. Where the two roots meet, at the limit without
-    damping, it is known to the root of the accuracy it has elsewhere.
+    Such a motion follows x₂ = a x₁ − b x₀: a and b by least squares, the growth is the larger modulus of the roots of
+    λ² = aλ − b. Where they meet, at the limit without damping, only half of its digits are known.
     """
     a, b = np.linalg.lstsq(np.column_stack([motion[1:-1], -motion[:-2]]), motion[2:], rcond=None)[0]
     return float(np.abs(np.roots([1.0, -a, b])).max())

@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -39,20 +39,11 @@ class Launched:
         return self.ready()()
 
 
-class Times(NamedTuple):
-    """Of each of some runs: the median time of a call [s], and half the range between the quartiles over it [1].
+def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: float) -> tuple[Array, Array]:
+    """Return each run's median time of a call [s], and half the range between the quartiles over it, shape (run,).
 
-    Shape (run,) each.
-    """
-
-    median: Array
-    spread: Array
-
-
-def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: float) -> Times:
-    """Return how long runs take: one after the other in each round, so that a slow moment of the machine hits all.
-
-    Runs are warm: each has been called before. affordable [s]: one that takes longer is called once.
+    Runs take turns in each round, so that a slow moment of the machine hits all, and are warm: each has been called
+    before. affordable [s]: one that takes longer is called once.
     """
     once = [seconds_of(run) for run in runs]
     repeats = [math.ceil(SHORTEST / max(seconds, 1e-9)) for seconds in once]
@@ -67,7 +58,7 @@ def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: f
     finally:
         gc.enable()
     quartiles = np.array([np.quantile(part, (0.25, 0.5, 0.75)) for part in samples]).reshape(-1, 3)
-    return Times(quartiles[:, 1], (quartiles[:, 2] - quartiles[:, 0]) / 2 / quartiles[:, 1])
+    return quartiles[:, 1], (quartiles[:, 2] - quartiles[:, 0]) / 2 / quartiles[:, 1]
 
 
 def seconds_of(run: Callable[[], object], repeats: int = 1) -> float:

@@ -7,24 +7,17 @@ velocity in equation 7, which makes all the difference: `symplectic_euler`.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 
-
-class ForwardEuler(NamedTuple):
-    """The tag of this scheme."""
-
-
+ForwardEuler = namedtuple("ForwardEuler", ())
 TAG = ForwardEuler()
-
-# One step of h, as files tell it.
 FORMULA = "x += h u; nodes turned by h L/I; then u += h a; L += h torque, all of the old state"
-
-# The velocity of a step is the path's slope half a step after it: x_(n+1) = x_n + h u_n.
-LAG = -0.5
+LAG = -0.5  # the velocity of a step is the path's slope half a step after it: x_(n+1) = x_n + h u_n
 
 
 @njit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
@@ -22,6 +23,18 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int, lag: 
     state.position[2] += time * (state.velocity[2] + fall * ((time + 2 * lag * h) / 2))
     state.velocity[2] += fall * time
     models.turn(model, physics, state, time)
+
+
+@njit
+def landing(pull: Any, clearance: float, speed: float) -> float:
+    """Return when [s] a point at a clearance [m], not negative, and a speed [m/s] upwards meets the ground; inf: never.
+
+    pull [m/s²]: its acceleration towards the ground.
+    """
+    square = speed * speed + 2 * pull * clearance
+    if speed < 0.0:
+        return 2 * clearance / (math.sqrt(square) - speed) if square >= 0.0 else math.inf
+    return (speed + math.sqrt(square)) / pull if pull > 0.0 else math.inf
 
 
 def lagging(lag: float) -> Any:

@@ -2,59 +2,38 @@
 
 Of M(v' − v) = h F(x + h v', v') it takes F linear: (M − h ∂F/∂v − h² ∂F/∂x) Δv = h (F + h ∂F/∂x v) (Baraff and Witkin
 1998, Large steps in cloth simulation, SIGGRAPH), but about the place to which free flight would take the cube in this
-step. So a node that comes to the ground within the step is pressed in it already, and one that leaves is not held back.
-About the present place the cube would first sink by up to h|v|, and its springs hold up to (ωh)² times its energy.
+step: a node that comes to the ground within the step is pressed in it already, and one that leaves is not held back.
 
-No step of a flat cube gains energy, the springs' included, at any stiffness (its potential is convex; Hairer and
-Wanner, Solving Ordinary Differential Equations II, IV.12). The bounce pays for it: it keeps about exp(−πωh/2) of its
-speed where ωh is small, and less than (ωh)⁻² where it is large. A depth d comes out of the ground at d/h at most. The
-nodes of a turning cube, whose arcs are not linear, may gain some h ω² r: nothing to speak of below a twentieth of a
-radian a step, and some tenths of the energy at one.
+No step of a flat cube gains energy, the springs' included (its potential is convex; Hairer and Wanner, Solving Ordinary
+Differential Equations II, IV.12). The nodes of a turning cube, whose arcs are not linear, may gain some h ω² r: nothing
+to speak of below a twentieth of a radian a step, and some tenths of the energy at one.
 
 The first system is without friction; it is solved again without the nodes that it would hold down, until there are
 none. The last has friction by these normal forces: F_f = −μ F_n u_t/(|u_t| + cutoff) with u_t at the end of the step
-and |u_t| at its begin. This is friction's chord: its tangent would overshoot standing still as explicit steps do. It
-turns no sliding node around, and the matrix stays symmetric and positive definite at any coefficient. It errs by
-μ g h/u, of first order as the rest (Steihaug and Wolfbrandt 1979, Math. Comp. 33, 521).
-
-One evaluation of the nodes' forces and slopes a step. In free flight it is symplectic Euler.
+and |u_t| at its begin. This is friction's chord (its tangent would overshoot standing still as explicit steps do): it
+turns no sliding node around, and the matrix stays symmetric and positive definite. It errs by μ g h/u, of first order
+as the rest (Steihaug and Wolfbrandt 1979, Math. Comp. 33, 521).
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
+from stiffdice.dynamics import contact
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import (
-    height_of,
-    node_velocity,
-    normal_force,
-    normal_slopes,
-    reaches,
-    speed_of,
-    split,
-    upward,
-)
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
+from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, unit, vector
 from stiffdice.integrators.free_flight import scaled
 from stiffdice.integrators.linear_equations import factorise, solve
 
-
-class ImplicitEuler(NamedTuple):
-    """The tag of this scheme."""
-
-
+ImplicitEuler = namedtuple("ImplicitEuler", ())
 TAG = ImplicitEuler()
-
-# One step of h, as files tell it.
 FORMULA = "(M - h dF/dv - h^2 dF/dx) dv = h (F + h dF/dx v), F linear about x + h v; v += dv; x += h v"
-
-# The velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n.
-LAG = 0.5
+LAG = 0.5  # the velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n
 
 _EVERY_NODE = -1  # in bits
 
@@ -63,8 +42,10 @@ _EVERY_NODE = -1  # in bits
 def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     weight = 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    height = height_of(physics, state) + h * (speed_of(physics, state) - h * physics.gravity * physics.nz)
-    if not reaches(law, height - physics.reach):
+    height = contact.height_of(physics, state) + h * (
+        contact.speed_of(physics, state) - h * physics.gravity * physics.nz
+    )
+    if not contact.reaches(law, height - physics.reach):
         models.kick(model, physics, state, weight, h)
         models.drift(model, physics, state, h)
         return 1
@@ -84,8 +65,7 @@ def _slips(physics: Physics, state: Any) -> Array:
     """Return each node's speed along the ground, cutoff added, shape (node,) [m/s]."""
     slips = np.empty(state.node_offset.shape[0])
     for k in range(slips.shape[0]):
-        _, tx, ty, tz = split(physics, *node_velocity(state, k))
-        slips[k] = math.sqrt(tx * tx + ty * ty + tz * tz) + physics.cutoff
+        slips[k] = norm(contact.split(physics, contact.node_velocity(state, k))[1]) + physics.cutoff
     return slips
 
 
@@ -129,13 +109,13 @@ def _assemble(
         system[k, k] = physics.mass if k < 3 else physics.inertia
     pressing = 0
     for k in range(slips.shape[0]):
-        rx, ry, rz = state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2]
-        depth = -upward(physics, state.position[0] + rx, state.position[1] + ry, state.position[2] + rz)
-        speed, tx, ty, tz = split(physics, *node_velocity(state, k))
-        push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
-        by_depth, by_speed = normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
+        arm = row(state.node_offset, k)
+        depth = -contact.upward(physics, plus(vector(state.position), arm))
+        speed, slip = contact.split(physics, contact.node_velocity(state, k))
+        push = contact.normal_force(law, depth, speed, physics.stiffness, physics.damping)
+        by_depth, by_speed = contact.normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
         stiffening = h * by_depth - by_speed
-        along = _lever(rx, ry, rz, physics.nx, physics.ny, physics.nz)
+        along = _lever(arm, contact.normal_of(physics))
         pressed = push - stiffening * _dot(along, change)
         if (nodes >> k) & 1 == 0 or pressed <= 0.0:
             continue
@@ -143,18 +123,18 @@ def _assemble(
         _add(system, along, h * stiffening, h * push)
         if rubbing:
             grip = h * physics.friction * pressed / slips[k]
-            _add(system, _lever(rx, ry, rz, tx, ty, tz), 0.0, -grip)
-            _add(system, _lever(rx, ry, rz, 1.0, 0.0, 0.0), grip, 0.0)
-            _add(system, _lever(rx, ry, rz, 0.0, 1.0, 0.0), grip, 0.0)
-            _add(system, _lever(rx, ry, rz, 0.0, 0.0, 1.0), grip, 0.0)
+            _add(system, _lever(arm, slip), 0.0, -grip)
+            for axis in range(3):
+                _add(system, _lever(arm, unit(axis)), grip, 0.0)
             _add(system, along, -grip, 0.0)
     return pressing
 
 
 @njit
-def _lever(rx: float, ry: float, rz: float, x: float, y: float, z: float) -> Motion:
-    """Return what a force (x, y, z) on a node at r does to the body: the force, and r × it."""
-    return x, y, z, ry * z - rz * y, rz * x - rx * z, rx * y - ry * x
+def _lever(arm: Vector, force: Vector) -> Motion:
+    """Return what a force on a node does to the body: the force, and r × it."""
+    torque = cross(arm, force)
+    return force.x, force.y, force.z, torque.x, torque.y, torque.z
 
 
 @njit

@@ -17,11 +17,8 @@ from stiffdice.scene.scene import Scene
 
 # Limits are looked for up to this ωh, in so many parts of it; all of explicit schemes are below three.
 _LONGEST, _LOOKS = 3.0, 3000
-
 # What round-off may add to an eigenvalue of modulus one.
 _ROUND_OFF = 1e-12
-
-
 # A damping ratio at which springs no longer matter to how fast a motion decays.
 _OVERDAMPED = 1e6
 
@@ -109,40 +106,36 @@ def stability_limit(scheme: str, zeta: float) -> float:
         return linear_theory.stability_limit(zeta)
     if scheme == "forward_euler":
         return 2 * zeta if zeta <= 1 else 2 / (zeta + math.sqrt(zeta - 1) * math.sqrt(zeta + 1))
-    step = _STEPS.get(scheme)
+    step = STEPS.get(scheme)
     if step is None:
         return math.inf
+
+    def stays(omega_h: float) -> bool:
+        map_of_step = step(omega_h * np.array([[0.0, 1.0], [-1.0, -2 * zeta]]))
+        return bool(np.abs(np.linalg.eigvals(map_of_step)).max() <= 1 + _ROUND_OFF)
+
     # A strongly damped contact is faster than its ω by 2ζ.
-    longest = _LONGEST / (1 + zeta)
-    stable, unstable = 0.0, longest / _LOOKS
-    while _radius(step, unstable, zeta) <= 1 + _ROUND_OFF:
-        stable, unstable = unstable, unstable + longest / _LOOKS
+    part = _LONGEST / (1 + zeta) / _LOOKS
+    stable, unstable = 0.0, part
+    while stays(unstable):
+        stable, unstable = unstable, unstable + part
     while stable < (middle := (stable + unstable) / 2) < unstable:
-        stable, unstable = (middle, unstable) if _radius(step, middle, zeta) <= 1 + _ROUND_OFF else (stable, middle)
+        stable, unstable = (middle, unstable) if stays(middle) else (stable, middle)
     return stable
 
 
-Step = Callable[[float, float, float, float], tuple[float, float]]
+def _velocity_verlet(motion: Array) -> Array:
+    """Return the map of place and velocity by a step, for h times the matrix of the motion; h is its upper right."""
+    kick, one = motion[1], np.eye(2)
+    predicted = one + motion + [motion[0, 1] / 2 * kick, np.zeros(2)]
+    return np.array([predicted[0], one[1] + (kick + kick @ predicted) / 2])
 
 
-def _radius(step: Step, h: float, zeta: float) -> float:
-    columns = [step(1.0, 0.0, h, zeta), step(0.0, 1.0, h, zeta)]
-    return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
+def _rk4(motion: Array) -> Array:
+    """Return the same: of a linear motion the exponential series up to h⁴."""
+    one = np.eye(2)
+    return one + motion @ (one + motion / 2 @ (one + motion / 3 @ (one + motion / 4)))
 
 
-def _velocity_verlet(x: float, v: float, h: float, zeta: float) -> tuple[float, float]:
-    old = -x - 2 * zeta * v
-    x, v = x + h * (v + h / 2 * old), v + h * old
-    return x, v + h / 2 * (-x - 2 * zeta * v - old)
-
-
-def _rk4(x: float, v: float, h: float, zeta: float) -> tuple[float, float]:
-    there, sum_x, sum_v = (x, v), x, v
-    # Of a linear motion it is the exponential series up to h⁴.
-    for power in range(1, 5):
-        there = h / power * there[1], -h / power * (there[0] + 2 * zeta * there[1])
-        sum_x, sum_v = sum_x + there[0], sum_v + there[1]
-    return sum_x, sum_v
-
-
-_STEPS: dict[str, Step] = {"velocity_verlet": _velocity_verlet, "rk4": _rk4}
+# The map of place and velocity by a step of a linear motion x' = A x, as a function of h A.
+STEPS: dict[str, Callable[[Array], Array]] = {"velocity_verlet": _velocity_verlet, "rk4": _rk4}

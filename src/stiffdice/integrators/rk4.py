@@ -9,7 +9,8 @@ stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in a small step (Hair
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,21 +19,13 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import STATE, Motion, Physics
+from stiffdice.dynamics.vector import Vector, cross, times, vector
 from stiffdice.integrators.free_flight import plus, scaled
 
-
-class RK4(NamedTuple):
-    """The tag of this scheme."""
-
-
+RK4 = namedtuple("RK4", ())
 TAG = RK4()
-
-# One step of h, as files tell it.
 FORMULA = "classical Runge-Kutta of order 4 for x, u and L; nodes turned by Munthe-Kaas' method of the same order"
-
-# The velocity is the path's slope at the place.
-LAG = 0.0
-
+LAG = 0.0  # the velocity is the path's slope at the place
 
 # How far from the step's begin each stage is, in steps, and its weight in the mean of all.
 _STAGES = ((0.0, 1 / 6), (0.5, 1 / 3), (0.5, 1 / 3), (1.0, 1 / 6))
@@ -44,8 +37,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     begin = np.empty(1, STATE)
     begin[0] = state
-    force, motion = _NONE, _NONE
-    mean_force, mean_motion = _NONE, _NONE
+    force = motion = mean_force = mean_motion = _NONE
     for far, weight in _STAGES:
         if far > 0.0:
             _advance(model, physics, begin, state, motion, force, far * h)
@@ -61,10 +53,8 @@ def _advance(
 ) -> None:
     """Put `state` where these slopes lead in h [s] from the step's begin."""
     start = begin[0]
-    state.position[:] = start.position
-    state.velocity[:] = start.velocity
-    state.angular_momentum[:] = start.angular_momentum
-    state.node_offset[:] = start.node_offset
+    state.position[:], state.velocity[:] = start.position, start.velocity
+    state.angular_momentum[:], state.node_offset[:] = start.angular_momentum, start.node_offset
     models.move(model, state, scaled(motion, h))
     models.kick(model, physics, state, force, h)
 
@@ -73,8 +63,8 @@ def _advance(
 def _slope(model: Any, law: Any, physics: Physics, state: Any, taken: Motion, h: float) -> tuple[Wrench, Motion]:
     """Return the slopes of the momenta and of place and rotation vector, h [s] of `taken` from the step's begin."""
     ux, uy, uz, wx, wy, wz = models.motion(model, physics, state)
-    tx, ty, tz = h * taken[3], h * taken[4], h * taken[5]
-    ax, ay, az = ty * wz - tz * wy, tz * wx - tx * wz, tx * wy - ty * wx
-    bx, by, bz = ty * az - tz * ay, tz * ax - tx * az, tx * ay - ty * ax
-    rx, ry, rz = wx - ax / 2 + bx / 12, wy - ay / 2 + by / 12, wz - az / 2 + bz / 12
-    return models.force(model, law, physics, state), (ux, uy, uz, rx, ry, rz)
+    turned = times(h, vector(taken[3:]))
+    a = cross(turned, Vector(wx, wy, wz))
+    b = cross(turned, a)
+    turning = wx - a.x / 2 + b.x / 12, wy - a.y / 2 + b.y / 12, wz - a.z / 2 + b.z / 12
+    return models.force(model, law, physics, state), (ux, uy, uz, *turning)

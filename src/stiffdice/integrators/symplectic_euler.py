@@ -8,24 +8,17 @@ Euler"; its equation 7 with the new u_cm is what the listings compute.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 
-
-class SymplecticEuler(NamedTuple):
-    """The tag of this scheme."""
-
-
+SymplecticEuler = namedtuple("SymplecticEuler", ())
 TAG = SymplecticEuler()
-
-# One step of h, as files tell it.
 FORMULA = "u += h a; L += h torque; x += h u; nodes turned by h L/I"
-
-# The velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n.
-LAG = 0.5
+LAG = 0.5  # the velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n
 
 
 @njit

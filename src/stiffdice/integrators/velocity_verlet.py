@@ -5,34 +5,26 @@ particle dynamics, the new velocity is predicted by the old force, u + h F/m, th
 the kick is corrected by it (Groot and Warren 1997, J. Chem. Phys. 107, 4423, with λ = 1: with their λ = 1/2, or with
 the velocity at the half step, the order is one). So it is of second order with damping and friction; without either it
 is the classical scheme, symplectic and linearly stable for ωh < 2 (Hairer, Lubich and Wanner, Geometric Numerical
-Integration, I.1.4). Two evaluations a step: the last force is at the predicted velocity, not at that of the state,
-which is why the next step cannot take it over.
+Integration, I.1.4). The next step cannot take over the last force: it is at the predicted velocity.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.integrators.free_flight import plus
 
-
-class VelocityVerlet(NamedTuple):
-    """The tag of this scheme."""
-
-
+VelocityVerlet = namedtuple("VelocityVerlet", ())
 TAG = VelocityVerlet()
-
-# One step of h, as files tell it.
 FORMULA = (
     "u += h a/2; L += h torque/2; x += h u; nodes turned by h L/I; u += h a/2; L += h torque/2, predicted and "
     "corrected once"
 )
-
-# The velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2.
-LAG = 0.0
+LAG = 0.0  # the velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2
 
 
 @njit

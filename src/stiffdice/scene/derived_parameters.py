@@ -66,7 +66,7 @@ def ground(keys: Mapping[str, Any], cube: Cube) -> Resolved:
     if not 0 < restitution <= 1:
         raise InputError(f"ground.restitution = {restitution:g}: allowed is a number above 0, up to 1 [1]")
     law = validation.choice("ground.contact", keys.get("contact", CONTACT), CONTACT_LAWS)
-    rest = {key: value for key, value in keys.items() if key not in INSTEAD["ground"]}
+    rest = {key: value for key, value in keys.items() if key not in INSTEAD["ground"]} | {"contact": law}
     source = f"from ground.restitution = {restitution:g}"
     told: tuple[str, ...] = ()
     if "contact_time" in keys:
@@ -99,11 +99,8 @@ def launch(keys: Mapping[str, Any], cube: Cube) -> dict[str, Any]:
 
 def _momentum(values: list[Any], cube: Cube) -> list[Any]:
     """Return angular velocities as angular momenta; values of which one that is not zero has another unit as given."""
-    turning = [isinstance(value, str) and units.has_unit(value, "rad/s") for value in values]
-    if not all(is_one or value == 0 for is_one, value in zip(turning, values, strict=True)):
+    try:
+        rates = [units.in_si(value, "rad/s") if value != 0 or value is False else 0.0 for value in values]
+    except (TypeError, ValueError):
         return values
-    inertia = cube.moment_of_inertia
-    return [
-        inertia * units.in_si(value, "rad/s") if is_one else value
-        for is_one, value in zip(turning, values, strict=True)
-    ]
+    return [cube.moment_of_inertia * rate for rate in rates]

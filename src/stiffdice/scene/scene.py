@@ -170,8 +170,6 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
     chosen = preset if preset is not None else top.get("preset")
     if "side" in sections["cube"]:
         sections["cube"].setdefault("geometry", derived_parameters.GEOMETRY)
-    if "restitution" in sections["ground"] and chosen is None:
-        sections["ground"].setdefault("contact", derived_parameters.CONTACT)
     if chosen is not None:
         _apply_preset(validation.choice("preset", chosen, PRESETS), sections)
     keys, derived = derived_parameters.cube(sections["cube"])
@@ -248,10 +246,9 @@ def _override(data: Any, text: str) -> Any:
         raise error.within(f"--set {text}") from None
     result = dict(validation.known_keys("", _given(data), _TOP_KEYS))
     if len(keys) == 1:
-        result[keys[0]] = value
         if keys[0] in _SECTIONS:
-            validation.known_keys(keys[0], result[keys[0]], _KEYS[keys[0]])
-        return result
+            validation.known_keys(keys[0], value, _KEYS[keys[0]])
+        return result | {keys[0]: value}
     if keys[0] not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
         known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]
         raise InputError(f"--set {text}: no such key{validation.meant(path, known)}")

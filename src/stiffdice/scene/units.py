@@ -1,8 +1,7 @@
 """Units that people write after a number, and the number in SI.
 
-A table and not a library of all units: nine symbols with their prefixes are what a scene's quantities have. A prefix
-moves the decimal exponent of the text before it is rounded, so that `16.1 mm` is the same double as `0.0161`, and two
-scenes that say the same have one digest; a product of two floats would not be.
+A prefix moves the decimal exponent of the text before it is rounded, so that `16.1 mm` is the same double as `0.0161`,
+and two scenes that say the same have one digest; a product of two floats, as libraries of units have, would not be.
 """
 
 from __future__ import annotations
@@ -85,27 +84,14 @@ def _symbol(text: str) -> Unit | None:
     return known
 
 
-def _parts(text: str) -> re.Match[str] | None:
-    """Return mantissa, exponent and unit of a text; none if it does not look like a number with a unit."""
-    return _VALUE.fullmatch(text) if len(text) <= _LONGEST else None
-
-
-def has_unit(text: str, unit: str) -> bool:
-    """Return whether a text is a number with a unit of the dimensions of `unit`."""
-    found, wanted = _parts(text), unit_of(unit)
-    given = unit_of(found[3]) if found else None
-    return given is not None and wanted is not None and given.dimensions == wanted.dimensions
-
-
 def in_si(text: str, unit: str) -> float:
     """Return the number [unit] that a text such as `16 mm` stands for; unit: an SI unit, as `kg/s²`.
 
     Raises ValueError with what is wrong in words, empty if it does not look like a number with a unit at all.
     """
-    comma = decimal_comma(text)
-    if comma:
+    if comma := decimal_comma(text):
         raise ValueError(comma)
-    found, wanted = _parts(text), unit_of(unit)
+    found, wanted = _VALUE.fullmatch(text) if len(text) <= _LONGEST else None, unit_of(unit)
     if found is None:
         raise ValueError
     given = unit_of(found[3])

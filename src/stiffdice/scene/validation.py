@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import numbers
@@ -30,30 +31,22 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
     unit: the SI unit, `1` or empty for a number without. Raises InputError for anything else: booleans, other text, NaN
     and infinities included.
     """
-    allowed = "a finite number"
-    if above is not None:
-        allowed += f" > {above:g}"
-    if at_least is not None:
-        allowed += f" >= {at_least:g}"
-    if unit:
-        allowed += f" [{unit}]"
-    if isinstance(value, str) and unit in units.EXAMPLES:
-        allowed += f", or with a unit, as {units.EXAMPLES[unit]}"
-    try:
-        if isinstance(value, str):
+    result, told, allowed = math.nan, shown(value), "allowed is a finite number"
+    allowed += "" if above is None else f" > {above:g}"
+    allowed += "" if at_least is None else f" >= {at_least:g}"
+    allowed += f" [{unit}]" if unit else ""
+    if isinstance(value, str):
+        allowed += f", or with a unit, as {units.EXAMPLES[unit]}" if unit in units.EXAMPLES else ""
+        try:
             result = units.in_si(value, unit)
-        elif isinstance(value, bool) or not isinstance(value, numbers.Real):
-            raise ValueError
-        else:
+        except ValueError as error:
+            told, allowed = (told, f"{error}; {allowed}") if str(error) else (f"the text '{told}'", allowed)
+    elif isinstance(value, numbers.Real) and not isinstance(value, bool):
+        with contextlib.suppress(OverflowError):
             result = float(value)
-    except (ValueError, OverflowError) as error:
-        reason = str(error) if isinstance(value, str) else ""
-        told = shown(value) if reason or not isinstance(value, str) else f"the text '{shown(value)}'"
-        raise InputError(f"{key} = {told}: {reason}{'; ' if reason else ''}allowed is {allowed}") from None
-    if not math.isfinite(result):
-        raise InputError(f"{key} = {shown(value)}: allowed is {allowed}")
-    if (above is not None and result <= above) or (at_least is not None and result < at_least):
-        raise InputError(f"{key} = {shown(value)}: allowed is {allowed}")
+    above, at_least = -math.inf if above is None else above, -math.inf if at_least is None else at_least
+    if not (math.isfinite(result) and result > above and result >= at_least):
+        raise InputError(f"{key} = {told}: {allowed}")
     return result + 0.0  # -0 is 0: equal scenes have equal digests
 
 

@@ -22,9 +22,11 @@ from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.simd import bits, store, where
 from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
-from stiffdice.integrators import batched_kernel
+from stiffdice.dynamics.vector import Vector, dot, inlined
+from stiffdice.integrators import batched_kernel, member_block
 from stiffdice.integrators import registry as schemes
-from stiffdice.integrators.batched_kernel import Alone, Body, Numbers, Vector, dot, inlined, row_of
+from stiffdice.integrators.batched_kernel import Numbers
+from stiffdice.integrators.member_block import Alone, Body, row_of
 from stiffdice.simulation import fast_forward
 from stiffdice.simulation.criteria.registry import CRITERIA, observe, open_of
 from stiffdice.simulation.reference import distance
@@ -41,14 +43,14 @@ LONGEST, _UNSEEN = 64, 50_000
 # Steps, about, after which compiled code returns, to see signals and tell progress; and what a member's event counts.
 _WORK, _EVENT = 400_000, 10
 
-# Rows of a block below those of `batched_kernel.py`. Since the member's last event: steps, largest energy in the air
+# Rows of a block below those of `member_block.py`. Since the member's last event: steps, largest energy in the air
 # [J]. Of the last step: clearance [m], still: 1 if it changed nothing. Of the one before: speed, height, clearance;
 # and the speed of the one before that. What makes an event: due, after so many steps less one, limit [J], rest [m²/s²],
 # live: 1, or 0 for a lane nobody is in. seen: 1 if something else than due made one; most: steps until a whole look.
 DONE, WORST, CLEARANCE, STILL, SPEED, HEIGHT, BEFORE, EARLIER, DUE, LIMIT, REST, LIVE, SEEN, MOST = range(
-    batched_kernel.ROWS, batched_kernel.ROWS + 14
+    member_block.ROWS, member_block.ROWS + 14
 )
-ROWS = batched_kernel.ROWS + 14
+ROWS = member_block.ROWS + 14
 
 _ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("trajectory")
 
@@ -102,7 +104,7 @@ def _energy(e: Balance, body: Body) -> Any:
 def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
     width, e = common.width, common.e
-    body = batched_kernel.read(width, block)
+    body = member_block.read(width, block)
     done, worst, clearance = row_of(width, block, DONE), row_of(width, block, WORST), row_of(width, block, CLEARANCE)
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
@@ -121,7 +123,7 @@ def _run_on(common: Common, block: Array) -> int:
         done = done + 1.0
         flying = where(up, max(worst, energy), worst)
         if happening != 0:
-            batched_kernel.write(block, new)
+            member_block.write(block, new)
             still = _same(new.velocity, body.velocity) & _same(new.place, body.place) & _same(new.a, body.a)
             still = still & _same(new.b, body.b) & _same(new.momentum, body.momentum) & ~unturned
             store(block, DONE, done)
@@ -155,7 +157,7 @@ def _only_compared(common: Common, axes: Array, block: Array, lane: int, member:
     time = sight.late + (done + int(taken)) * sight.step_size
     if block[SEEN, lane] > 0.0 or taken >= block[MOST, lane] or not time < reference.horizon:
         return False
-    state.position[0], state.position[1], state.position[2] = batched_kernel.place_of(axes, block, lane)
+    state.position[0], state.position[1], state.position[2] = member_block.place_of(axes, block, lane)
     off = distance(reference, time, state) / common.system.physics.radius
     if off > memory.limits[_TRAJECTORY] and memory.decided[_TRAJECTORY] == 0:
         return False
@@ -174,7 +176,7 @@ def _lies(sight: Any, memory: Any) -> bool:
 def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Member, samples: States, done: int) -> int:
     """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
     state, sight, memory, _ = member
-    batched_kernel.leave(common.system.model, axes, block, lane, state)
+    member_block.leave(common.system.model, axes, block, lane, state)
     sight.speed, sight.height, sight.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     sight.speed_before = block[EARLIER, lane]
     ratio = 1.0 + (block[WORST, lane] - memory.energy[1]) / memory.energy[2]
@@ -266,7 +268,7 @@ def _march(
             block[LIVE, lane] = 1.0 if most > 0 else 0.0
             if most > 0:
                 if moved:
-                    batched_kernel.enter(axes, ensemble[m], block, lane)
+                    member_block.enter(axes, ensemble[m], block, lane)
                 _wait(common, block, lane, member, most)
         if inside.max() < 0:
             return -1
@@ -285,14 +287,14 @@ def start(task: Task) -> Callable[[], bool] | None:
     scene, model = setup.scene, setup.model
     if setup.scheme != SCHEME or model not in TOUCHING:
         return None
-    axes, h = batched_kernel.axes_of(scene), setup.step_size
+    axes, h = member_block.axes_of(scene), setup.step_size
     k, e = batched_kernel.numbers_of(system.physics, axes, h), _balance(system.physics, axes, h, members.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
-    width = Alone() if len(members.ensemble) < FEWEST else batched_kernel.ABREAST[model]
+    width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)
     common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, e, task.limits)
-    lanes = batched_kernel.WIDTHS[type(width)]
+    lanes = member_block.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
     waiting = 0
 

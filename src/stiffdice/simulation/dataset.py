@@ -38,13 +38,10 @@ AXES = ("x", "y", "z")
 AXIS_ATTRIBUTES = schema.attributes_of("run", "axis", AXES)
 
 
-# By the measure's name; those of steps that are counted.
+# By the measure's name.
 MEASURE_ATTRIBUTES = {
     criterion.MEASURE: {"long_name": criterion.LONG_NAME, "units": "1"} for criterion in CRITERIA.values()
 }
-STEPS_DONE_ATTRIBUTES = schema.attributes_of("shard", "steps_done")
-STEPS_COMPUTED_ATTRIBUTES = schema.attributes_of("shard", "steps_computed")
-EVALUATIONS_ATTRIBUTES = schema.attributes_of("run", "evaluations")
 CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
     "contact": CONTACT_ATTRIBUTES,
     **{name: schema.attributes_of("shard", name) for name in ("stiffness", "steps", "omega_h")},

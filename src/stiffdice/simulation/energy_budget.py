@@ -28,9 +28,19 @@ import xarray as xr
 
 from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS, height_of, node_force, node_velocity, normal_force, reaches, upward
+from stiffdice.dynamics.contact import (
+    LAWS,
+    height_of,
+    node_force,
+    node_velocity,
+    normal_force,
+    normal_of,
+    reaches,
+    upward,
+)
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of, start_of
+from stiffdice.dynamics.vector import Vector, cross, plus, plus_times, row, times, vector
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
@@ -43,8 +53,8 @@ BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
 
 LARGEST = 10_000  # bounces whose rows are kept
 
-# Steps made and booked at once: some hundredths of a second.
-_AT_ONCE = 10_000
+# Steps made and booked at once: what caches hold.
+_AT_ONCE = 2_000
 
 # A step that books more [J] ends the ledger, so that all sums of what is booked stay within doubles.
 LARGEST_WORK = 1e290
@@ -226,34 +236,30 @@ def _feel(law: Any, physics: Physics, state: Any, forces: Any) -> float:
     if not reaches(law, clearance):
         return float(clearance)
     clearance = math.inf
-    x, y, z = state.position[0], state.position[1], state.position[2]
-    for k in range(state.node_offset.shape[0]):
-        r = state.node_offset[k]
-        vx, vy, vz = node_velocity(state, k)
-        depth = -upward(physics, x + r[0], y + r[1], z + r[2])
-        fx, fy, fz = node_force(law, physics, depth, vx, vy, vz)
+    n = normal_of(physics)
+    for k in range(len(state.node_offset)):
+        arm, velocity = row(state.node_offset, k), node_velocity(state, k)
+        depth = -upward(physics, plus(vector(state.position), arm))
+        force = node_force(law, physics, depth, velocity)
         if depth > 0.0:
-            spring, speed = physics.stiffness * depth, upward(physics, vx, vy, vz)
+            spring, speed = physics.stiffness * depth, upward(physics, velocity)
             push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
-            nx, ny, nz = physics.nx, physics.ny, physics.nz
-            _pull(forces[_SPRING], r, spring * nx, spring * ny, spring * nz)
-            _pull(forces[_DAMPING], r, (push - spring) * nx, (push - spring) * ny, (push - spring) * nz)
-            _pull(forces[_FRICTION], r, fx - push * nx, fy - push * ny, fz - push * nz)
+            _pull(forces[_SPRING], arm, times(spring, n))
+            _pull(forces[_DAMPING], arm, times(push - spring, n))
+            _pull(forces[_FRICTION], arm, plus_times(force, -push, n))
         else:
-            _pull(forces[_DRAG], r, fx, fy, fz)
+            _pull(forces[_DRAG], arm, force)
         clearance = min(clearance, -depth)
     return clearance
 
 
 @njit
-def _pull(wrench: Any, r: Any, fx: float, fy: float, fz: float) -> None:
-    """Add a force on the node at r, and its torque."""
-    wrench[0] += fx
-    wrench[1] += fy
-    wrench[2] += fz
-    wrench[3] += r[1] * fz - r[2] * fy
-    wrench[4] += r[2] * fx - r[0] * fz
-    wrench[5] += r[0] * fy - r[1] * fx
+def _pull(wrench: Any, arm: Vector, force: Vector) -> None:
+    """Add a force on a node, and its torque."""
+    torque = cross(arm, force)
+    for axis in range(3):
+        wrench[axis] += force[axis]
+        wrench[3 + axis] += torque[axis]
 
 
 @np.errstate(all="ignore")  # of a run that leaves the range of doubles

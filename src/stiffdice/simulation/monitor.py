@@ -26,7 +26,7 @@ from stiffdice.dynamics.state import Physics
 # a flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
 # change any more (`fast_forward.py`); touched: 1 if a node was on the ground at any step so far. Of the last bounce:
 # speed_in, speed_out [m/s] at zero clearance, NaN if unknown. Of a scheme that takes its own steps
-# (`adaptive_steps.py`): pending [s], what is left of the step that was begun; work, done so far.
+# (`integrators/registry.py`): pending [s], what is left of the step that was begun; work, done so far.
 SIGHT = np.dtype(
     [
         (name, np.float64)

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import Array
 
 SAMPLES = 2048
 
@@ -29,23 +28,10 @@ REFERENCE = np.dtype(
 )
 
 
-def none() -> npt.NDArray[np.void]:
-    """Return a reference that nothing is compared with, shape (1,)."""
-    reference = np.zeros(1, REFERENCE)
-    reference["horizon"] = -1.0
-    return reference
-
-
-def tabulated(horizon: float, position: Array, velocity: Array) -> npt.NDArray[np.void]:
-    """Return references, shape (member,), from positions [m] and velocities [m/s], shape (member, SAMPLES + 1, 3).
-
-    The samples are evenly spread from time 0 to horizon [s].
-    """
-    references = np.zeros(len(position), REFERENCE)
-    references["horizon"] = horizon
-    references["spacing"] = horizon / SAMPLES
-    references["position"] = position
-    references["velocity"] = velocity
+def empty(count: int = 1, horizon: float = -1.0) -> npt.NDArray[np.void]:
+    """Return references whose samples are to be filled, shape (count,), evenly spread from time 0 to horizon [s]."""
+    references = np.zeros(count, REFERENCE)
+    references["horizon"], references["spacing"] = horizon, horizon / SAMPLES
     return references
 
 

@@ -25,7 +25,7 @@ from stiffdice.simulation.criteria.apex import default_hop_height
 from stiffdice.simulation.criteria.registry import MEMORY, finish, limits_of, observe, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import start as criteria_start
 from stiffdice.simulation.monitor import SIGHT
-from stiffdice.simulation.reference import none
+from stiffdice.simulation.reference import empty
 from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, room_for, until_kept
 
 # Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
@@ -177,7 +177,7 @@ def _task(
     sight["step_size"], sight["steps"], sight["late"] = setup.step_size, setup.steps, late
     sight["lag"], sight["hop_height"] = setup.lag, hop_height
     memory["limits"] = limits_of(stop or {})
-    references = none() if references is None else references
+    references = empty() if references is None else references
     watched = Members(launches.copy(), sight, memory, references, samples, *np.zeros((3, count), np.int64))
     limits = Limits(setup.steps, setup.budget if budget is None else budget, every or 0, number)
     task = Task(setup, limits, hop_height, launches, watched)

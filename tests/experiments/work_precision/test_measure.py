@@ -134,7 +134,6 @@ def test_times_are_taken_of_the_same_rungs(flat, timed):
     np.testing.assert_allclose(found.seconds[0, k][beyond], steps[beyond] * float(timed.seconds_per_step[0, k]))
     for peer in ("scipy_lsoda", "scipy_dop853"):
         assert found.itself[0, found.methods.index(peer)].all()
-    assert (timed.first_seconds > 0).all()
     assert {"machine_processor", "versions", "measured_at"} <= set(timed.attrs)
 
 

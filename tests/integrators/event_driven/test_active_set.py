@@ -21,24 +21,21 @@ def law_force(model, law, physics, state):
 
 
 @njit(cache=True)
-def motion_of(turning, state, motion):
-    active_set.take(turning, state[0], motion)
+def derivative(contact, motion, rate):
+    active_set.derivative(contact, motion, rate)
 
 
 @njit(cache=True)
-def derivative(turning, physics, nodes, bits, motion, rate):
-    active_set.derivative(turning, physics, nodes, bits, motion, rate)
+def begin(contact, state, motion):
+    active_set.take(contact.turning, state[0], motion)
+    small = np.zeros(2)
+    active_set.vanishing(contact.physics, motion, small)
+    active_set.begin(contact, motion, small)
 
 
 @njit(cache=True)
-def begin(turning, dragging, physics, nodes, motion, bits, small):
-    active_set.vanishing(physics, motion, small)
-    active_set.begin(turning, dragging, physics, nodes, motion, bits, small)
-
-
-@njit(cache=True)
-def switches(turning, dragging, physics, nodes, bits, motion, rate, value, slope):
-    active_set.switches(turning, dragging, physics, nodes, bits, motion, rate, value, slope)
+def switches(contact, motion, rate, value, slope):
+    active_set.switches(contact, motion, rate, value, slope)
 
 
 def landing(law, stiffness=1e4, height=0.4, **ground):
@@ -58,18 +55,19 @@ def landing(law, stiffness=1e4, height=0.4, **ground):
 
 
 def begun(scene, model="tumbling"):
-    turning = model == "tumbling"
-    launch, physics = start_of(scene, model), physics_of(scene)
-    motion = np.zeros(active_set.SIZE)
-    motion_of(turning, launch, motion)
-    bits, nodes = np.zeros(8, np.int8), launch["node_offset"][0].copy()
-    begin(turning, scene.ground.contact == "ungated", physics, nodes, motion, bits, np.zeros(2))
-    return turning, physics, nodes, bits, motion
+    """The contact in which a scene begins, and the motion."""
+    launch, motion = start_of(scene, model), np.zeros(active_set.SIZE)
+    regime = np.zeros(1, [("nodes", np.float64, (8, 3)), ("bits", np.int8, 8)])
+    regime["nodes"] = launch["node_offset"]
+    dragging = scene.ground.contact == "ungated"
+    contact = active_set.Contact(model == "tumbling", dragging, physics_of(scene), regime[0])
+    begin(contact, launch, motion)
+    return contact, motion
 
 
-def rate_of(turning, physics, nodes, bits, motion):
+def rate_of(contact, motion):
     rate = np.zeros_like(motion)
-    derivative(turning, physics, nodes, bits, motion, rate)
+    derivative(contact, motion, rate)
     return rate
 
 
@@ -79,43 +77,32 @@ def test_the_forces_are_those_of_the_law(law, model):
     touched = 0
     for height in np.linspace(-0.8, 1.2, 60):
         scene = landing(law, height=float(height), normal=[0.1, -0.2, 0.9])
-        parts = begun(scene, model)
-        rate = rate_of(*parts)
+        contact, motion = begun(scene, model)
+        rate = rate_of(contact, motion)
         wrench = law_force(models.MODELS[model], LAWS[law], physics_of(scene), start_of(scene, model))
         np.testing.assert_allclose(rate[3:6] * scene.cube.mass, wrench[:3], rtol=1e-12, atol=1e-10)
         if model == "tumbling":
             np.testing.assert_allclose(rate[6:9], wrench[3:], rtol=1e-12, atol=1e-9)
-        touched += bool(parts[3].any())
+        touched += bool(contact.regime["bits"].any())
     assert touched > 20
 
 
 def test_the_quaternion_turns_at_the_spin():
-    parts = begun(landing("gated"))
-    spin = parts[4][6:9] / parts[1].inertia
-    rate = rate_of(*parts)
+    contact, motion = begun(landing("gated"))
+    spin, rate = motion[6:9] / contact.physics.inertia, rate_of(contact, motion)
     np.testing.assert_allclose(rate[9:13], [0, *(spin / 2)], atol=1e-15)
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_switches_change_as_their_slopes_say(law):
     for _ in range(20):
-        turning, physics, nodes, bits, motion = begun(landing(law))
-        rate = rate_of(turning, physics, nodes, bits, motion)
+        contact, motion = begun(landing(law))
+        rate = rate_of(contact, motion)
         values, slope, other = np.zeros((2, 16)), np.zeros(16), np.zeros(16)
         d = 1e-7
         for end, sign in enumerate((-1, 1)):
             moved = motion + sign * d * rate
-            switches(
-                turning,
-                law == "ungated",
-                physics,
-                nodes,
-                bits,
-                moved,
-                rate_of(turning, physics, nodes, bits, moved),
-                values[end],
-                other,
-            )
-        switches(turning, law == "ungated", physics, nodes, bits, motion, rate, other, slope)
+            switches(contact, moved, rate_of(contact, moved), values[end], other)
+        switches(contact, motion, rate, other, slope)
         np.testing.assert_allclose((values[1] - values[0]) / (2 * d), slope, rtol=1e-6, atol=1e-5)
         assert (other >= 0).all()

@@ -12,23 +12,23 @@ from stiffdice.integrators.event_driven import active_set, held_contact
 
 
 @njit(cache=True)
-def slopes(turning, physics, nodes, bits, motion, about, by_speed, by_place):
-    held_contact.slopes(turning, physics, nodes, bits, motion, about, by_speed, by_place)
+def slopes(contact, motion, about, by_speed, by_place):
+    held_contact.slopes(contact, motion, about, by_speed, by_place)
 
 
 @njit(cache=True)
-def slips(turning, physics, nodes, bits, motion, slip):
-    held_contact.slips(turning, physics, nodes, bits, motion, slip)
+def slips(contact, motion, slip):
+    held_contact.slips(contact, motion, slip)
 
 
 @njit(cache=True)
-def straighten(turning, physics, nodes, bits, motion, about, rate):
-    held_contact.straighten(turning, physics, nodes, bits, motion, about, rate)
+def straighten(contact, motion, about, rate):
+    held_contact.straighten(contact, motion, about, rate)
 
 
 @njit(cache=True)
-def retouch(turning, physics, nodes, bits, motion, about):
-    return held_contact.retouch(turning, physics, nodes, bits, motion, about)
+def retouch(contact, motion, about):
+    return held_contact.retouch(contact, motion, about)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -39,15 +39,15 @@ def test_slopes_are_those_of_the_rates(law, times):
     Friction is by its tangent at the motion's own slips, or at others.
     """
     for _ in range(20):
-        turning, physics, nodes, bits, motion = begun(landing(law))
+        contact, motion = begun(landing(law))
         by_speed, by_place, about = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((8, 3))
-        slips(turning, physics, nodes, bits, motion, about)
+        slips(contact, motion, about)
         about *= times
-        slopes(turning, physics, nodes, bits, motion, about, by_speed, by_place)
+        slopes(contact, motion, about, by_speed, by_place)
 
-        def rate_at(change, parts=(turning, physics, nodes, bits), motion=motion, about=about):
-            rate = rate_of(*parts, motion + change)
-            straighten(*parts, motion + change, about, rate)
+        def rate_at(change, contact=contact, motion=motion, about=about):
+            rate = rate_of(contact, motion + change)
+            straighten(contact, motion + change, about, rate)
             return rate[3:9]
 
         for column in range(6):
@@ -60,20 +60,20 @@ def test_slopes_are_those_of_the_rates(law, times):
             if column < 3:
                 change[column] = d
             else:
-                change[10 + column - 3] = d / 2 / physics.inertia
+                change[10 + column - 3] = d / 2 / contact.physics.inertia
             difference = rate_at(change) - rate_at(-change)
             np.testing.assert_allclose(by_place[:, column], difference / (2 * d), rtol=2e-5, atol=2e-3)
 
 
 def test_a_tangent_of_friction_touches_its_law_and_follows_it():
-    turning, physics, nodes, bits, motion = begun(landing("gated"))
-    own, rate = np.zeros((8, 3)), rate_of(turning, physics, nodes, bits, motion)
-    slips(turning, physics, nodes, bits, motion, own)
+    contact, motion = begun(landing("gated"))
+    own, rate = np.zeros((8, 3)), rate_of(contact, motion)
+    slips(contact, motion, own)
     straight = rate.copy()
-    straighten(turning, physics, nodes, bits, motion, own, straight)
+    straighten(contact, motion, own, straight)
     np.testing.assert_allclose(straight, rate, rtol=1e-12)
     held = 1e-6 * own  # from slips of the order of the cutoff it takes some rounds to slips of metres a second
     for _ in range(10):
-        off = retouch(turning, physics, nodes, bits, motion, held)
+        off = retouch(contact, motion, held)
     assert off == 0.0
     np.testing.assert_array_equal(held, own)

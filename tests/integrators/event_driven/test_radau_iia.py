@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.integrators.event_driven.test_active_set import begun
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.integrators.event_driven import active_set, dop853, radau_iia
 from stiffdice.scene.scene import from_mapping
 
@@ -15,30 +15,16 @@ OMEGA = 2 * np.sqrt(1e4)
 
 
 @njit(cache=True)
-def begin(physics, state, nodes, motion, bits, rate):
-    active_set.take(True, state[0], motion)
-    small = np.zeros(2)
-    active_set.vanishing(physics, motion, small)
-    active_set.begin(True, False, physics, nodes, motion, bits, small)
-    active_set.derivative(True, physics, nodes, bits, motion, rate)
+def implicit(contact, start, h, end):
+    return radau_iia.step(contact, start, h, end, np.full(active_set.SIZE, 1e-12))
 
 
 @njit(cache=True)
-def rate_of(physics, nodes, bits, motion, rate):
-    active_set.derivative(True, physics, nodes, bits, motion, rate)
-
-
-@njit(cache=True)
-def implicit(physics, nodes, bits, start, rate, h, end):
-    return radau_iia.step(True, physics, nodes, bits, start, rate, h, end, np.full(active_set.SIZE, 1e-12))
-
-
-@njit(cache=True)
-def explicit(physics, nodes, bits, start, h, steps, end):
+def explicit(contact, start, h, steps, end):
     here, stages = start.copy(), np.zeros((dop853.STAGES + 1, active_set.SIZE))
     for _ in range(steps):
-        active_set.derivative(True, physics, nodes, bits, here, stages[0])
-        dop853.step(True, physics, nodes, bits, here, h / steps, stages, end)
+        active_set.derivative(contact, here, stages[0])
+        dop853.step(contact, here, h / steps, stages, end)
         here[:] = end
 
 
@@ -55,12 +41,9 @@ def pressed(slip):
             },
         }
     )
-    motion, rate, bits = np.zeros(active_set.SIZE), np.zeros(active_set.SIZE), np.zeros(8, np.int8)
-    state, physics = start_of(scene, "tumbling"), physics_of(scene)
-    nodes = state["node_offset"][0].copy()
-    begin(physics, state, nodes, motion, bits, rate)
-    assert bits.any()
-    return physics, nodes, bits, motion, rate
+    contact, motion = begun(scene)
+    assert contact.regime["bits"].any()
+    return contact, motion
 
 
 def test_stages_are_those_of_a_collocation():
@@ -75,38 +58,37 @@ def test_stages_are_those_of_a_collocation():
 
 @pytest.mark.parametrize(("integrator", "order", "part"), [(explicit, 9, 0.2), (implicit, 10, 0.8)])
 def test_both_integrators_have_their_orders(integrator, order, part):
-    physics, nodes, bits, motion, rate = pressed(3.0)
+    contact, motion = pressed(3.0)
     errors = []
     for h in np.array([part, part / 2]) / OMEGA:
         best, end = np.zeros((2, active_set.SIZE))
-        explicit(physics, nodes, bits, motion, h, 64, best)
+        explicit(contact, motion, h, 64, best)
         if integrator is implicit:
-            implicit(physics, nodes, bits, motion, rate, h, end)
+            implicit(contact, motion, h, end)
         else:
-            explicit(physics, nodes, bits, motion, h, 1, end)
+            explicit(contact, motion, h, 1, end)
         errors.append(np.abs(end - best).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=1.2)
 
 
-def slip_of(physics, nodes, bits, motion):
+def slip_of(contact, motion):
     """How fast the node in the ground slides [m/s]."""
-    turned = rotated(nodes, 2 * motion[10:13] / motion[9])[np.flatnonzero(bits)[0]]
-    velocity = motion[3:6] + np.cross(motion[6:9] / physics.inertia, turned)
+    turned = rotated(contact.regime["nodes"], 2 * motion[10:13] / motion[9])[np.flatnonzero(contact.regime["bits"])[0]]
+    velocity = motion[3:6] + np.cross(motion[6:9] / contact.physics.inertia, turned)
     return np.hypot(velocity[0], velocity[1])
 
 
 def test_a_node_held_by_friction_stays_held_over_long_steps():
     """Over a hundredth of a bounce and more, against steps that follow the cutoff, a millionth as long."""
-    physics, nodes, bits, start, _ = pressed(0.0)
-    motion, rate, best, end = np.zeros((4, active_set.SIZE))
-    explicit(physics, nodes, bits, start, 1e-7, 300, motion)  # until friction has taken hold
-    rate_of(physics, nodes, bits, motion, rate)
+    contact, start = pressed(0.0)
+    motion, best, end = np.zeros((3, active_set.SIZE))
+    explicit(contact, start, 1e-7, 300, motion)  # until friction has taken hold
     h = 0.05 / OMEGA
-    explicit(physics, nodes, bits, motion, h, 750_000, best)
-    error, evaluations = implicit(physics, nodes, bits, motion, rate, h, end)
+    explicit(contact, motion, h, 750_000, best)
+    error, evaluations = implicit(contact, motion, h, end)
     assert error < 1
     assert evaluations <= 8 * radau_iia.STAGES
     np.testing.assert_allclose(end[:9], best[:9], rtol=0, atol=1e-12)
     np.testing.assert_allclose(end[10:], best[10:], rtol=0, atol=1e-12)  # 1 − 1e-12 is lost in so many steps
-    assert slip_of(physics, nodes, bits, end) < 2 * physics.cutoff
+    assert slip_of(contact, end) < 2 * contact.physics.cutoff
     assert np.abs(end[6:9]).max() > 1e-3  # it is turned about that node

@@ -295,21 +295,6 @@ def test_swings_of_a_cube_that_rests_are_taken_at_once(contact):
     assert simulate(laid, model="sliding", scheme="exact", steps=1).evaluations[0] < 100
 
 
-def test_bounces_without_damping_repeat():
-    """A drop from 1 nm on ground of 1e16 kg/s², 10⁵ bounces: whole, and from drop to drop."""
-    drop = scene_of("gated", 1e16, 0.0, position=(0, 0, HALF + 1e-9), velocity=(0, 0, 0), duration=3.0)
-    run = simulate(drop, model="sliding", scheme="exact", steps=1)
-    assert run.evaluations[0] < 30
-    start = sum(part[0] for part in energies(physics_of(drop), start_of(drop, "sliding")))
-    assert sum(part[0] for part in energies(physics_of(drop), run.end)) == pytest.approx(start, abs=1e-15)
-    pull, height, omega = 9.8, end_of(dataclasses.replace(drop, duration=1e-12))[2] - HALF, 2e8
-    flight, speed = 2 * math.sqrt(2 * height / pull), math.sqrt(2 * pull * height)
-    period = flight + (2 * math.pi - 2 * math.atan2(omega * speed, pull)) / omega
-    phase = 3.0 % period
-    low = dataclasses.replace(drop, duration=phase)
-    np.testing.assert_allclose(end_of(low)[5], end_of(drop)[5], rtol=0, atol=3e5 * 1e-16 * pull)
-
-
 def test_swings_of_a_cube_that_slides_are_taken_at_once():
     """3·10⁴ swings about the height of rest; in quarters all of them are computed, and each rounds, alike."""
     near = {"position": (0, 0, HALF - 9.8 / 4e12 - 1e-12), "velocity": (100, 0, 0)}

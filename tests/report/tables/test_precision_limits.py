@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stiffdice.errors import InputError
-from stiffdice.experiments.precision_limits import LARGEST, LIMITS, measure
+from stiffdice.experiments.precision_limits import LARGEST, measure
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.tables import precision_limits
 from stiffdice.scene.scene import Scene, from_mapping
@@ -29,7 +29,7 @@ def by_name(dataset, which):
 def test_every_limit_is_found_where_its_formula_says(keys, measured):
     dataset = measured if not keys else measure(from_mapping(keys))
     predicted, found = by_name(dataset, "predicted"), by_name(dataset, "measured")
-    assert list(predicted) == list(LIMITS)
+    assert list(predicted) == list(precision_limits._ROWS)
     for name, value in predicted.items():
         rough = {"growth": 0.15, "spring_at_deepest": 1e-4}
         assert found[name] == pytest.approx(value, rel=rough.get(name, 1e-6)), name
@@ -69,7 +69,7 @@ def test_the_table_tells_every_limit_twice(measured):
     assert told.markdown.startswith("# A title\n")
     heading, *rows = csv.reader(io.StringIO(told.csv))
     assert heading == ["limit", "formula", "predicted", "measured", "unit"]
-    assert len(rows) == len(LIMITS)
+    assert len(rows) == len(precision_limits._ROWS)
     assert [row[4] for row in rows].count("s") == 3
     assert rows[0][2:4] == ["2.7×10¹⁶", "2.7×10¹⁶"]
     twice = precision_limits.table({"precision": measured.assign(measured=2 * measured.measured)}, "A title")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice.experiments import layout
+from stiffdice.experiments.measuring import coordinates
+from stiffdice.experiments.work_precision.effort import GRID
 from stiffdice.report.tables.work_precision import cost_of, found_in, table, targets
 
 COSTS = np.array([1e2, 1e3, 1e4, 1e5, 1e6])
@@ -73,20 +74,20 @@ def made(problem, methods, tolerance, errors, evaluations, seconds):
     shape = np.shape(errors)
     grounds = list(np.geomspace(1e2, 1e12, shape[0]))
     tried = {
-        "steps": (layout.EFFORT_GRID, np.full(shape, 12)),
-        "tolerance": (layout.EFFORT_GRID, np.broadcast_to(tolerance, shape)),
+        "steps": (GRID, np.full(shape, 12)),
+        "tolerance": (GRID, np.broadcast_to(tolerance, shape)),
     }
-    coordinates = {"stiffness": layout.of_cells("stiffness", grounds), "method": layout.method_axis(methods)}
+    axes = coordinates(stiffness=grounds, method=methods)
     found = {"evaluations": evaluations, "position_error": errors}
-    variables = {name: (layout.EFFORT_GRID, np.array(values, float)) for name, values in found.items()}
+    variables = {name: (GRID, np.array(values, float)) for name, values in found.items()}
     times = {
-        "seconds": (layout.EFFORT_GRID, np.array(seconds, float)),
-        "seconds_per_step": (layout.EFFORT_GRID[:2], np.full(shape[:2], np.nan)),
+        "seconds": (GRID, np.array(seconds, float)),
+        "seconds_per_step": (GRID[:2], np.full(shape[:2], np.nan)),
     }
     attributes = {"problem": problem}
     return {
-        "found": xr.Dataset(tried | variables, coordinates, attributes),
-        "timed": xr.Dataset(tried | times, coordinates, attributes),
+        "found": xr.Dataset(tried | variables, axes, attributes),
+        "timed": xr.Dataset(tried | times, axes, attributes),
     }
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.models import sliding, tumbling
 from stiffdice.dynamics.state import Physics
 
-
-class Flying(NamedTuple):
-    """The tag of this model."""
-
-
+Flying = namedtuple("Flying", ())
 TAG = Flying()
 
 kick = sliding.kick  # no torque ever changes the spin

@@ -5,7 +5,6 @@ What turns the cube, and what the ground touches, is said in `state.py`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +12,7 @@ from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.contact import lowest_of
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
 from stiffdice.dynamics.state import TOUCHING, TURNING, Motion, Physics
+from stiffdice.dynamics.vector import norm, vector
 
 _MODULES: dict[str, Any] = {
     "vertical": vertical,
@@ -30,17 +30,12 @@ def _chosen(part: str) -> Callable[..., Any]:
 
 # (model, law, physics, state) -> force [N] and torque [N m] on the body in this state.
 force = _chosen("force")
-
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
 kick = _chosen("kick")
-
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
 drift = _chosen("drift")
-
-# (model) -> whether the body turns.
+# (model) -> whether the body turns; whether the ground can act on it.
 turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
-
-# (model) -> whether the ground can act on the body.
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
 
 
@@ -54,10 +49,10 @@ def turn(model: Any, physics: Physics, state: Any, duration: float) -> None:
 @njit
 def motion(model: Any, physics: Physics, state: Any) -> Motion:
     """Return the velocity [m/s] and the spin [rad/s] at which place and orientation change."""
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
+    ux, uy, uz = vector(state.velocity)
     if not turns(model):
         return ux, uy, uz, 0.0, 0.0, 0.0
-    lx, ly, lz = state.angular_momentum[0], state.angular_momentum[1], state.angular_momentum[2]
+    lx, ly, lz = vector(state.angular_momentum)
     return ux, uy, uz, lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
 
 
@@ -66,10 +61,9 @@ def move(model: Any, state: Any, shift: Any) -> None:
     """Shift the place by the first three [m], and turn the body by the rotation vector of the other three [rad]."""
     for axis in range(3):
         state.position[axis] += shift[axis]
-    ax, ay, az = shift[3], shift[4], shift[5]
-    angle = math.sqrt(ax * ax + ay * ay + az * az)
+    angle = norm(vector(shift[3:]))
     if turns(model) and angle > 0.0:
-        tumbling.rotate(state, ax / angle, ay / angle, az / angle, angle)
+        tumbling.rotate(state, shift[3] / angle, shift[4] / angle, shift[5] / angle, angle)
 
 
 @njit

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench, height_of, node_force, reaches, upward
 from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.vector import Vector, plus, row, vector
 
-
-class Sliding(NamedTuple):
-    """The tag of this model."""
-
-
+Sliding = namedtuple("Sliding", ())
 TAG = Sliding()
 
 
@@ -21,17 +19,11 @@ def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the total force on the cube [N]; its torque is left out."""
     if not reaches(law, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    x, y, z = state.position[0], state.position[1], state.position[2]
-    ux, uy, uz = state.velocity[0], state.velocity[1], state.velocity[2]
-    nodes = state.node_offset
-    fx = fy = fz = 0.0
-    for k in range(nodes.shape[0]):
-        depth = -upward(physics, x + nodes[k, 0], y + nodes[k, 1], z + nodes[k, 2])
-        gx, gy, gz = node_force(law, physics, depth, ux, uy, uz)
-        fx += gx
-        fy += gy
-        fz += gz
-    return fx, fy, fz, 0.0, 0.0, 0.0
+    place, velocity, total = vector(state.position), vector(state.velocity), Vector(0.0, 0.0, 0.0)
+    for k in range(len(state.node_offset)):
+        depth = -upward(physics, plus(place, row(state.node_offset, k)))
+        total = plus(total, node_force(law, physics, depth, velocity))
+    return total.x, total.y, total.z, 0.0, 0.0, 0.0
 
 
 @njit

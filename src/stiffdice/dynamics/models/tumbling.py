@@ -7,18 +7,16 @@ it (paper, section 2.1).
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench, height_of, node_force, node_velocity, reaches, upward
 from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, vector
 
-
-class Tumbling(NamedTuple):
-    """The tag of this model."""
-
-
+Tumbling = namedtuple("Tumbling", ())
 TAG = Tumbling()
 
 
@@ -27,20 +25,12 @@ def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the total force [N] and torque about the centre [N m] (equations 3 and 10)."""
     if not reaches(law, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    x, y, z = state.position[0], state.position[1], state.position[2]
-    nodes = state.node_offset
-    fx = fy = fz = tx = ty = tz = 0.0
-    for k in range(nodes.shape[0]):
-        rx, ry, rz = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        vx, vy, vz = node_velocity(state, k)
-        gx, gy, gz = node_force(law, physics, -upward(physics, x + rx, y + ry, z + rz), vx, vy, vz)
-        fx += gx
-        fy += gy
-        fz += gz
-        tx += ry * gz - rz * gy
-        ty += rz * gx - rx * gz
-        tz += rx * gy - ry * gx
-    return fx, fy, fz, tx, ty, tz
+    place, total, torque = vector(state.position), Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
+    for k in range(len(state.node_offset)):
+        arm = row(state.node_offset, k)
+        on_node = node_force(law, physics, -upward(physics, plus(place, arm)), node_velocity(state, k))
+        total, torque = plus(total, on_node), plus(torque, cross(arm, on_node))
+    return total.x, total.y, total.z, torque.x, torque.y, torque.z
 
 
 @njit
@@ -62,18 +52,18 @@ def drift(physics: Physics, state: Any, h: float) -> None:
 @njit
 def turn(physics: Physics, state: Any, duration: float) -> None:
     """Turn the nodes for so long [s] at the spin that the angular momentum says (equation 9)."""
-    wx, wy, wz = _spin(physics, state)
-    rate = math.sqrt(wx * wx + wy * wy + wz * wz)
+    _spin(physics, state)
+    spin = vector(state.angular_velocity)
+    rate = norm(spin)
     if rate > 0.0:
-        rotate(state, wx / rate, wy / rate, wz / rate, rate * duration)
+        rotate(state, spin.x / rate, spin.y / rate, spin.z / rate, rate * duration)
 
 
 @njit
-def _spin(physics: Physics, state: Any) -> tuple[float, float, float]:
-    """Let the nodes move with the spin that the angular momentum says, and return it [rad/s]."""
+def _spin(physics: Physics, state: Any) -> None:
+    """Let the nodes move with the spin that the angular momentum says."""
     for axis in range(3):
         state.angular_velocity[axis] = state.angular_momentum[axis] / physics.inertia
-    return state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
 
 
 @njit

@@ -6,17 +6,14 @@ nodes are summed in the same order.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench, normal_force, reaches
 from stiffdice.dynamics.state import Physics
 
-
-class Vertical(NamedTuple):
-    """The tag of this model."""
-
-
+Vertical = namedtuple("Vertical", ())
 TAG = Vertical()
 
 

@@ -13,9 +13,8 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import flat_bounce, linear_theory
-from stiffdice.experiments import options
 from stiffdice.experiments.engines.single_bounce import MODEL, OUTCOMES, bounce, flat, heights_at_rest
-from stiffdice.experiments.layout import method_axis, of_cells, quantity
+from stiffdice.experiments.measuring import coordinates, mapped, quantity, scan, span
 from stiffdice.experiments.placement import contact_frequency, landing_speed
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
@@ -32,6 +31,12 @@ _MAGIC = 8
 # Of a cube at rest: the nudge in units of the sag, and the steps for which it is followed.
 _NUDGE, _FOLLOWED = 0.01, 200
 
+_DESCRIBED = {
+    "restitution": ("restitution of one flat bounce", "1", "phase"),
+    "outcome": ("what becomes of the cube", "1", "phase"),
+    "rest_growth": (f"growth of a nudge of a cube at rest in {_FOLLOWED} steps", "1"),
+}
+
 
 def measure(
     scene: Scene,
@@ -45,44 +50,32 @@ def measure(
 
     scene: gives the cube, gravity, stiffness, damping, and the speed at which its launch meets the ground, which is
     level, gated and without friction. methods: names of schemes and engines. omega_h: ends of the span. count: values
-    in it, evenly in their logarithm, to which the longest magic steps are added and those half way between them, at
-    which symplectic Euler is at its best and worst. phases: how many, evenly over a step from 0 on.
-    `restitution` is not-a-number unless the cube leaves the ground. `rest_growth` is the largest distance from where
-    the cube would rest, over the nudge; infinite where it blows up.
-
+    in it, evenly in their logarithm, besides the longest magic steps and those half way between them. phases: how many,
+    evenly over a step from 0 on. `restitution` is not-a-number unless the cube leaves the ground; `rest_growth` the
+    largest distance from where it would rest over the nudge, infinite where it blows up.
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short.
     """
     names = stepper.chosen_from(methods)
     special = [linear_theory.magic_step(n) for n in np.arange(1.5, _MAGIC + 1, 0.5)]
-    scan = options.scan(*options.span(omega_h), validation.count("count", count, at_least=2), special).tolist()
+    values = scan(*span(omega_h), validation.count("count", count, at_least=2), special).tolist()
     phase = np.arange(validation.count("phases", phases)) / phases
     smooth = flat(scene, friction=0.0)
     speed, omega = landing_speed(smooth), contact_frequency(scene)
-    bounces = [
-        [[bounce(name, smooth, speed, value / omega, float(part)) for part in phase] for value in scan]
-        for name in names
-    ]
-    growth = [[_growth(name, smooth, value / omega) for value in scan] for name in names]
-    grid = ("method", "omega_h", "phase")
-    restitution = [[[part.restitution for part in row] for row in table] for table in bounces]
-    outcome = [[[OUTCOMES.index(part.outcome) for part in row] for row in table] for table in bounces]
+
+    def fates(method: str, value: float) -> tuple[list[float], list[int], float]:
+        h = value / omega
+        bounces = [bounce(method, smooth, speed, h, part) for part in phase.tolist()]
+        outcomes = [OUTCOMES.index(part.outcome) for part in bounces]
+        return [part.restitution for part in bounces], outcomes, _growth(method, smooth, h)
+
+    found = mapped(fates, _DESCRIBED, method=names, omega_h=values) | coordinates(phase=phase)
+    dimensions, outcome, _ = found["outcome"]
+    found["outcome"] = dimensions, outcome.astype(np.int8), enum_attributes("what becomes of the cube", OUTCOMES)
+    found["exact_restitution"] = quantity((), flat_bounce.restitution(smooth, speed), "exact restitution")
     attributes = dataset.provenance_attributes("The longest steps", scene, MODEL, "method", __name__)
-    attributes |= stepper.attributes(names) | {"scene_note": "ground: level, gated, without friction; an upright cube"}
-    return xr.Dataset(
-        {
-            "restitution": quantity(grid, restitution, "restitution of one flat bounce"),
-            "outcome": (grid, np.array(outcome, np.int8), enum_attributes("what becomes of the cube", OUTCOMES)),
-            "rest_growth": quantity(grid[:2], growth, f"growth of a nudge of a cube at rest in {_FOLLOWED} steps"),
-            "exact_restitution": quantity((), flat_bounce.restitution(smooth, speed), "exact restitution"),
-        },
-        {
-            "method": method_axis(names),
-            "omega_h": of_cells("omega_h", scan),
-            "phase": quantity("phase", phase, "fraction of the step before the nodes meet the ground"),
-        },
-        attributes,
-    )
+    note = "ground: level, gated, without friction; an upright cube"
+    return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"scene_note": note})
 
 
 def _growth(method: str, scene: Scene, h: float) -> float:

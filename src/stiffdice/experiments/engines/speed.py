@@ -13,7 +13,7 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.experiments.engines.limits import METHODS
-from stiffdice.experiments.layout import enum, method_axis, quantity
+from stiffdice.experiments.measuring import coordinates, quantity
 from stiffdice.experiments.timing import Launched, interleaved, machine
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, scene_of
 from stiffdice.scene import validation
@@ -36,7 +36,6 @@ def time(
 
     scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
-
     Raises InputError for a number out of range, and an engine that is not installed.
     """
     names = stepper.chosen_from(methods)
@@ -54,12 +53,9 @@ def time(
     attributes = dataset.provenance_attributes("Steps a second", scene, "problem", "method", __name__)
     attributes |= stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
     grid = ("problem", "method")
-    return xr.Dataset(
-        {
-            "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),
-            "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
-            "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
-        },
-        {"problem": enum("problem", TIMED, "problem"), "method": method_axis(names)},
-        attributes,
-    )
+    variables = coordinates(problem=TIMED, method=names) | {
+        "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),
+        "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
+        "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
+    }
+    return xr.Dataset(variables, attrs=attributes)

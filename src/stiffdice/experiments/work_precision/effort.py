@@ -13,13 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.experiments.layout import EFFORT_GRID, EFFORTS, Variable, quantity
-from stiffdice.experiments.sampling import states_of
+from stiffdice.experiments.measuring import Variable, quantity, states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
-from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS
 from stiffdice.simulation.engines.stepper import Path
@@ -41,7 +38,12 @@ COARSE, FINE = 1e-2, 1e-12
 # ωh of a flat landing where the ladder of a fixed step begins: where the explicit schemes are stable.
 LONGEST = 1.5
 
-
+# What every run on a ladder has: dimensions; meaning and unit.
+GRID = ("stiffness", "method", "effort")
+EFFORTS = {
+    "steps": ("number of time steps, 0 where the method takes its own", "1"),
+    "tolerance": ("tolerance of a method that controls its own error", "1"),
+}
 # Zero past a ladder's end, where other numbers are not-a-number.
 _COUNTS = {"steps", "evaluations", "evaluations_computed"}
 
@@ -64,12 +66,7 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
     Raises InputError for any other name, and for an engine that is not installed.
     """
     known = methods_for(problem)
-    if list(names) == [ALL]:
-        return known
-    for name in names:
-        if validation.choice("methods", name, [*known, *STEPPING, ALL]) in PEERS:
-            engines.adapter_of(name, "methods")
-    return list(names)
+    return known if list(names) == [ALL] else stepper.chosen_from(names, [*known, *STEPPING])
 
 
 def fixed_step(method: str) -> bool:
@@ -139,5 +136,5 @@ def by_effort(
         values = np.zeros(shape, np.int64) if name in _COUNTS else np.full(shape, np.nan)
         for i, k in np.ndindex(shape[:2]):
             values[i, k, : len(found[i][k])] = [rung[name] for rung in found[i][k]]
-        variables[name] = quantity(EFFORT_GRID, values, *text)
+        variables[name] = quantity(GRID, values, *text)
     return variables

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from stiffdice.experiments import options
-from stiffdice.experiments.layout import enum, method_axis, of_cells, quantity
+from stiffdice.dynamics.state import Array
+from stiffdice.experiments.measuring import coordinates, numbers, quantity
 from stiffdice.experiments.placement import contact_frequency, fall_speed, relaunched
 from stiffdice.experiments.work_precision import effort as efforts
 from stiffdice.experiments.work_precision.effort import ALL, Effort, fixed_step, methods_for, path_of
@@ -54,7 +53,6 @@ _NOTE = "the problem's: level ground, gated, at the stiffness of the dimension; 
 _AGREEMENT = "difference of a reference from the first, by each measure"
 _FLOOR = "what half a unit in the last place becomes: low, one in the launch; high, one in the depth of a contact"
 
-
 _DESCRIBED = {f"{name}_error": (text, "1") for name, text in MEASURES.items()} | {
     "evaluations": ("evaluations of the force in plain stepping", "1"),
     "evaluations_computed": ("evaluations of the force that were made, the others taken at once", "1"),
@@ -74,17 +72,14 @@ def measure(
     """Return errors and force evaluations, dimensions stiffness, method, effort (NaN and 0 past a ladder's end).
 
     problem: a name of PROBLEMS. methods: names of schemes and peers. stiffness [kg/s²]. per_decade: efforts in a decade
-    of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made;
-    where flights, or contacts that are known, are taken at once, a run may have many more. A peer's ladder ends at its
-    part of it (`Peer.dearness`).
-    `evaluations` are those of plain stepping, `evaluations_computed` those made. `agreement` has the difference of each
-    reference from the first, `floor` what half a unit in the last place grows to: in the launch, and in the place
-    during a contact, where it is one of the depth.
-
+    of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made,
+    those taken at once not counted; a peer's ladder ends at its part of it (`Peer.dearness`).
+    `agreement` has the difference of each reference from the first, `floor` what half a unit in the last place grows
+    to: in the launch, and in the place during a contact, where it is one of the depth.
     Raises InputError for a number out of range, and for a scene in which the cube does not land and leave again.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
-    grounds = options.stiffnesses(stiffness)
+    grounds = numbers("stiffness", stiffness, "kg/s²", above=0)
     per_decade, budget = validation.count("per_decade", per_decade), validation.count("budget", budget)
     steps = validation.number("steps", steps, "1", at_least=SAMPLES)
     scenes = [scene_of(chosen, scene, value) for value in grounds]
@@ -97,26 +92,15 @@ def measure(
         agreement.append([list(judge.errors(path.states).values()) for path in paths])
         floor.append(_floors(chosen, ground, sources[0], judge, budget))
         found.append([_climbed(chosen, ground, name, judge, per_decade, steps, budget) for name in names])
-    attributes = dataset.provenance_attributes(
-        f"Work and precision: {chosen.name}", scene, chosen.model, "method", __name__
-    )
-    return xr.Dataset(
-        efforts.by_effort(found, _DESCRIBED)
-        | {
-            "agreement": quantity(("stiffness", "source", "measure"), agreement, _AGREEMENT),
-            "floor": quantity(("stiffness", "bound", "measure"), floor, _FLOOR),
-        },
-        {
-            "stiffness": of_cells("stiffness", grounds),
-            "method": method_axis(names),
-            "source": enum("source", sources, "reference"),
-            "bound": enum("bound", ["low", "high"], "bound of the floor"),
-            "measure": enum("measure", list(MEASURES), "error"),
-        },
-        attributes
-        | stepper.attributes(names)
-        | {"scene_note": _NOTE, "problem": problem, "samples": SAMPLES, "reference": sources[0]},
-    )
+    variables = coordinates(
+        stiffness=grounds, method=names, source=sources, bound=["low", "high"], measure=MEASURES
+    ) | efforts.by_effort(found, _DESCRIBED)
+    variables["agreement"] = quantity(("stiffness", "source", "measure"), agreement, _AGREEMENT)
+    variables["floor"] = quantity(("stiffness", "bound", "measure"), floor, _FLOOR)
+    title = f"Work and precision: {chosen.name}"
+    attributes = dataset.provenance_attributes(title, scene, chosen.model, "method", __name__)
+    attributes |= {"scene_note": _NOTE, "problem": problem, "samples": SAMPLES, "reference": sources[0]}
+    return xr.Dataset(variables, attrs=attributes | stepper.attributes(names))
 
 
 def _climbed(
@@ -150,22 +134,20 @@ def _climbed(
     return rungs
 
 
-def _floors(problem: Problem, scene: Scene, source: str, judge: Judge, budget: int) -> list[list[float]]:
+def _floors(problem: Problem, scene: Scene, source: str, judge: Judge, budget: int) -> Array:
     """Return for each measure what half a unit in the last place becomes, in the launch and in a contact.
 
     In the launch: each number of it is nudged alone, and the changes are added as if at random. In a contact an error
     of the place is one of the depth, which is only v/ω: relative to what the contact does it is ω r/v times as large.
     """
-    nudge, radius = _NUDGE, scene.cube.radius
+    radius = scene.cube.radius
     speed = fall_speed(scene, scene.launch.position[2] - touchdown(scene))
-    squares = dict.fromkeys(MEASURES, 0.0)
-    for nudged in _nudged(scene, nudge * radius, nudge * speed, problem.turns):
-        errors = judge.errors(path_of(problem, nudged, source, REFERENCES[source], budget).states)
-        squares = {name: squares[name] + (errors[name] / nudge) ** 2 for name in MEASURES}
+    scenes = _nudged(scene, _NUDGE * radius, _NUDGE * speed, problem.turns)
+    paths = [path_of(problem, nudged, source, REFERENCES[source], budget) for nudged in scenes]
+    grown = np.array([[*judge.errors(path.states).values()] for path in paths]) / _NUDGE
     # A measure is a number itself, of the order of one.
-    launch = [max(1.0, math.sqrt(square)) * _HALF_UNIT for square in squares.values()]
-    deep = contact_frequency(scene) * radius / speed
-    return [launch, [part * max(1.0, deep) for part in launch]]
+    launch = np.fmax(1.0, np.sqrt((grown**2).sum(axis=0))) * _HALF_UNIT
+    return np.array([launch, launch * max(1.0, contact_frequency(scene) * radius / speed)])
 
 
 def _nudged(scene: Scene, place: float, speed: float, turns: bool) -> list[Scene]:
@@ -174,9 +156,6 @@ def _nudged(scene: Scene, place: float, speed: float, turns: bool) -> list[Scene
     changes = {"position": place, "velocity": speed} | ({"angular_momentum": spin} if turns else {})
     scenes = []
     for key, change in changes.items():
-        for axis in range(3):
-            value = np.array(launch.spin if key == "angular_momentum" else getattr(launch, key))
-            value[axis] += change
-            moved: Any = {key: (float(value[0]), float(value[1]), float(value[2]))}
-            scenes.append(relaunched(scene, **moved))
+        value = np.array(launch.spin if key == "angular_momentum" else getattr(launch, key))
+        scenes += [relaunched(scene, **{key: tuple(moved)}) for moved in (value + change * np.eye(3)).tolist()]
     return scenes

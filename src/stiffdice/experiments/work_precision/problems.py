@@ -15,7 +15,7 @@ from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import Array, States, physics_of, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.bisection import bisected
+from stiffdice.experiments.measuring import bisected
 from stiffdice.experiments.placement import level, relaunched, upright
 from stiffdice.scene.scene import Scene
 
@@ -98,7 +98,8 @@ class Judge:
         self._after = _next_flight(scene, reference)
         self._launch_energy = float(_energy(scene, start_of(scene, problem.model))[0])
         self._end_energy = float(_energy(scene, reference[-1:])[0])
-        self._restitution = self._speeds(reference, 0.0)
+        down, up = self._speeds(reference, 0.0)
+        self._restitution = up / down
 
     def errors(self, states: States, lag_time: float = 0.0) -> dict[str, float]:
         """Return the error by each of MEASURES; not-a-number where a run left the range of doubles.
@@ -116,10 +117,10 @@ class Judge:
 
     def _restitution_error(self, states: States, lag_time: float) -> float:
         down, up = self._speeds(states, lag_time)
-        if self._problem.turns:
-            wanted_down, wanted_up = self._restitution
-            return abs(up / down - wanted_up / wanted_down)
-        return abs(up / down - flat_bounce.restitution(self._scene, down)) if 0 < down < math.inf else math.nan
+        if not 0 < down < math.inf:
+            return math.nan
+        exact = self._restitution if self._problem.turns else flat_bounce.restitution(self._scene, down)
+        return abs(up / down - exact)
 
     def _speeds(self, states: States, lag_time: float) -> tuple[float, float]:
         """Return the centre's speed down and up [m/s] at the height of the first touch, on the flights' parabolas."""
@@ -131,21 +132,16 @@ class Judge:
 
 
 def _next_flight(scene: Scene, states: States) -> int:
-    """Return the first sample after the first landing from which on the cube flies until the next."""
-    flown = _flown(scene, states)
+    """Return the first sample after the first landing from which on nothing but gravity acts until the next."""
+    fall = scene.gravity * scene.duration / (len(states) - 1)
+    change = np.diff(states["velocity"], axis=0) + np.array([0.0, 0.0, fall])
+    twist = np.diff(states["angular_momentum"], axis=0)
+    flown = (np.abs(change).max(axis=1) < 1e-5 * fall) & (np.abs(twist).max(axis=1) < 1e-5)
     landed = int(np.argmin(flown))
     later = np.flatnonzero(flown[landed:])
     if flown.all() or not later.size:
         raise InputError(f"ground.stiffness = {scene.ground.stiffness:g}: the cube does not leave the ground in time")
     return landed + int(later[0])
-
-
-def _flown(scene: Scene, states: States) -> Array:
-    """Return whether between two samples nothing but gravity acted, shape (sample,)."""
-    fall = scene.gravity * scene.duration / (len(states) - 1)
-    change = np.diff(states["velocity"], axis=0) + np.array([0.0, 0.0, fall])
-    twist = np.diff(states["angular_momentum"], axis=0)
-    return np.asarray((np.abs(change).max(axis=1) < 1e-5 * fall) & (np.abs(twist).max(axis=1) < 1e-5))
 
 
 def _energy(scene: Scene, states: States) -> Array:

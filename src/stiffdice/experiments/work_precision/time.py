@@ -4,33 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import xarray as xr
 
-from stiffdice.experiments import options
-from stiffdice.experiments.layout import method_axis, of_cells, quantity
-from stiffdice.experiments.timing import Launched, Times, interleaved, machine, seconds_of
-from stiffdice.experiments.work_precision.effort import ALL, Effort, by_effort, chosen_from, fixed_step, ladder, plain
+from stiffdice.experiments.measuring import coordinates, numbers, quantity
+from stiffdice.experiments.timing import Launched, interleaved, machine, seconds_of
+from stiffdice.experiments.work_precision.effort import (
+    ALL,
+    GRID,
+    Effort,
+    by_effort,
+    chosen_from,
+    fixed_step,
+    ladder,
+    plain,
+)
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Problem, scene_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 
+# A run on a ladder, to be timed.
+Rung = tuple[Effort, Callable[[], object]]
 
-class Rung(NamedTuple):
-    """One run on a ladder, and how long its first call took [s]."""
-
-    effort: Effort
-    run: Callable[[], object]
-    first: float
-
-
-_DESCRIBED = {
-    "seconds": ("median wall time of a run", "s"),
-    "spread": ("half the range between the quartiles of the times over their median", "1"),
-}
 _PER_STEP = "wall time per step of a fixed step, from the longest run timed"
 
 # Of a fixed step's ladder so many rungs are timed, the longest that are affordable: time is proportional to steps.
@@ -53,50 +50,29 @@ def time(
 
     problem, methods, stiffness, per_decade: as for the experiment `work-precision`. affordable [s]: longer runs are
     timed once. The ladder of a fixed step ends there, as above it `seconds_per_step` says, any other after three times
-    that. rounds: in each every run is timed; the median is stored. `first_seconds` is a method's first call in a fresh
-    process, which loads compiled code, or compiles it if nobody has; everything else is warm.
-
-    Raises InputError as the experiment does.
+    that. rounds: in each every run is timed, warm. Raises InputError as the experiment does.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]
-    grounds = options.stiffnesses(stiffness)
+    grounds = numbers("stiffness", stiffness, "kg/s²", above=0)
     affordable = validation.number("affordable", affordable, "s", above=0)
     per_decade, rounds = validation.count("per_decade", per_decade), validation.count("rounds", rounds)
     names = chosen_from(chosen, methods)
-    climbed, times = [], []
+    found, per_step = [], []
     for value in grounds:
         ground = scene_of(chosen, scene, value)
-        climbed.append([_climbed(chosen, ground, name, per_decade, affordable) for name in names])
-        times.append(interleaved([rung.run for rungs in climbed[-1] for rung in rungs], rounds, affordable))
-    rows = [_numbers(rungs_of, taken) for rungs_of, taken in zip(climbed, times, strict=True)]
-    per_step = [[_per_step(name, rungs) for name, rungs in zip(names, row, strict=True)] for row in rows]
-    attributes = dataset.provenance_attributes(
-        f"Time of work and precision: {chosen.name}", scene, chosen.model, "method", __name__
-    )
-    return xr.Dataset(
-        by_effort(rows, _DESCRIBED)
-        | {
-            "seconds_per_step": quantity(("stiffness", "method"), per_step, _PER_STEP, "s"),
-            "first_seconds": quantity(
-                "method", [rungs[0].first for rungs in climbed[0]], "first call in a fresh process", "s"
-            ),
-        },
-        {"stiffness": of_cells("stiffness", grounds), "method": method_axis(names)},
-        attributes | {"problem": problem, "samples": SAMPLES, "rounds": rounds} | stepper.attributes(names) | machine(),
-    )
-
-
-def _per_step(method: str, rungs: Sequence[dict[str, float]]) -> float:
-    return rungs[-1]["seconds"] / rungs[-1]["steps"] if fixed_step(method) else math.nan
-
-
-def _numbers(climbed: Sequence[Sequence[Rung]], times: Times) -> list[list[dict[str, float]]]:
-    """Return the numbers of each rung, by method; times: of all rungs, one method after another."""
-    taken = iter(zip(times.median, times.spread, strict=True))
-    return [
-        [rung.effort._asdict() | dict(zip(("seconds", "spread"), next(taken), strict=True)) for rung in rungs]
-        for rungs in climbed
-    ]
+        climbed = [_climbed(chosen, ground, name, per_decade, affordable) for name in names]
+        times, _ = interleaved([run for rungs in climbed for _, run in rungs], rounds, affordable)
+        taken = iter(times.tolist())
+        found.append([[effort._asdict() | {"seconds": next(taken)} for effort, _ in rungs] for rungs in climbed])
+        ends = zip(names, (rungs[-1] for rungs in found[-1]), strict=True)
+        per_step.append([end["seconds"] / end["steps"] if fixed_step(name) else math.nan for name, end in ends])
+    variables = coordinates(stiffness=grounds, method=names)
+    variables |= by_effort(found, {"seconds": ("median wall time of a run", "s")})
+    variables["seconds_per_step"] = quantity(GRID[:2], per_step, _PER_STEP, "s")
+    title = f"Time of work and precision: {chosen.name}"
+    attributes = dataset.provenance_attributes(title, scene, chosen.model, "method", __name__)
+    attributes |= {"problem": problem, "samples": SAMPLES, "rounds": rounds}
+    return xr.Dataset(variables, attrs=attributes | stepper.attributes(names) | machine())
 
 
 def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affordable: float) -> list[Rung]:
@@ -104,13 +80,13 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
     rungs: list[Rung] = []
     took = 0.0
     for effort in ladder(scene, method, per_decade, math.inf):
-        if fixed_step(method) and rungs and took * effort.steps / rungs[-1].effort.steps > affordable:
+        if fixed_step(method) and rungs and took * effort.steps / rungs[-1][0].steps > affordable:
             break
         run = Launched(plain(problem, scene, method, effort))
-        first = took = seconds_of(run)
-        if not rungs:  # it may have compiled
-            took = seconds_of(run)
-        rungs.append(Rung(effort, run, first))
+        if not rungs:  # it may compile
+            run()
+        took = seconds_of(run)
+        rungs.append((effort, run))
         if took > _END * affordable:
             break
     return rungs[-_RUNGS:] if fixed_step(method) else rungs

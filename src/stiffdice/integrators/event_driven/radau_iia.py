@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.event_driven.active_set import NODES, SIZE, derivative, quaternion_rate
+from stiffdice.integrators.event_driven.active_set import NODES, SIZE, Contact, derivative, quaternion_rate
 from stiffdice.integrators.event_driven.held_contact import retouch, slips, slopes, straighten
 from stiffdice.integrators.linear_equations import factorise, solve
 
@@ -50,52 +49,44 @@ def _beyond(stages: list[int]) -> Any:
 
 _ERROR_4, _ERROR_2 = _beyond([0, 1, 2, 3]), _beyond([1, 3])
 
-# Newton's method: iterations at most.
-_ITERATIONS = 12
-
-# The part of the tolerated error at which it ends.
-_ENOUGH = 1e-2
-
-
-# The part of the last correction above which the slopes are worked out anew.
-_SLOW = 0.1
+# Newton's method: iterations at most, the part of the tolerated error at which it ends, and the part of the last
+# correction above which the slopes are worked out anew.
+_ITERATIONS, _ENOUGH, _SLOW = 12, 1e-2, 0.1
 
 
 @njit
-def step(
-    turning: bool, physics: Physics, nodes: Any, regime: Any, start: Any, rate: Any, h: float, end: Any, scale: Any
-) -> tuple[float, int]:
+def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[float, int]:
     """Set `end` to the motion `start` after h [s] in a regime; return the error over what is tolerated, evaluations.
 
-    rate: start's derivative. scale: what is tolerated of each part. The error is infinite where no stages are found.
+    scale: what is tolerated of each part. The error is infinite where no stages are found.
     """
-    unknowns = 6 if turning else 3
+    unknowns = 6 if contact.turning else 3
     change, rates, rest = np.zeros((STAGES, SIZE)), np.zeros((STAGES, SIZE)), np.empty(STAGES * unknowns)
     by_speed, by_place = np.empty((STAGES, 6, 6)), np.empty((STAGES, 6, 6))
     factors, about = np.empty((STAGES * unknowns, STAGES * unknowns)), np.zeros((STAGES, NODES, 3))
-    slips(turning, physics, nodes, regime, start, about[0])
-    slopes(turning, physics, nodes, regime, start, about[0], by_speed[0], by_place[0])
+    slips(contact, start, about[0])
+    slopes(contact, start, about[0], by_speed[0], by_place[0])
     for stage in range(1, STAGES):
         about[stage], by_speed[stage], by_place[stage] = about[0], by_speed[0], by_place[0]
-    _follow(turning, physics, start, h, change, rates, scale)
+    _follow(contact, start, h, change, rates, scale)
     correction, last, iteration, fresh, found = 0.0, 0.0, 0, True, False
     # One that wanders off may find other stages, as smooth and as wrong.
     while not found and iteration < _ITERATIONS and (iteration < 3 or correction < last):
         for stage in range(STAGES):
             _reach(start, change[stage], end)
-            derivative(turning, physics, nodes, regime, end, rates[stage])
-            straighten(turning, physics, nodes, regime, end, about[stage], rates[stage])
+            derivative(contact, end, rates[stage])
+            straighten(contact, end, about[stage], rates[stage])
             if fresh and iteration > 0:
-                slopes(turning, physics, nodes, regime, end, about[stage], by_speed[stage], by_place[stage])
+                slopes(contact, end, about[stage], by_speed[stage], by_place[stage])
         if fresh:
             _couple(by_speed, by_place, h, unknowns, factors)
             factorise(factors)
         last, correction = correction, _correct(change, rates, h, unknowns, factors, rest, scale)
-        correction = max(correction, _follow(turning, physics, start, h, change, rates, scale))
+        correction = max(correction, _follow(contact, start, h, change, rates, scale))
         off = 0.0
         for stage in range(STAGES):
             _reach(start, change[stage], end)
-            off = max(off, retouch(turning, physics, nodes, regime, end, about[stage]) / scale[3])
+            off = max(off, retouch(contact, end, about[stage]) / scale[3])
         iteration += 1
         left = correction * min(1.0, correction / last) if last > 0.0 else correction
         found = left <= _ENOUGH and off <= _ENOUGH
@@ -124,14 +115,20 @@ def _couple(by_speed: Any, by_place: Any, h: float, unknowns: int, matrix: Any) 
 
 
 @njit
+def _gained(rates: Any, h: float, stage: int, part: int) -> float:
+    """Return what a part of the motion gains until a stage by the rates at all stages."""
+    total = 0.0
+    for j in range(STAGES):
+        total += COUPLING[stage, j] * rates[j, part]
+    return h * total
+
+
+@njit
 def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, rest: Any, scale: Any) -> float:
     """Correct the changes of the velocities by one iteration; return by how much, over what is tolerated."""
     for i in range(STAGES):
         for part in range(unknowns):
-            total = 0.0
-            for j in range(STAGES):
-                total += COUPLING[i, j] * rates[j, 3 + part]
-            rest[i * unknowns + part] = h * total - change[i, 3 + part]
+            rest[i * unknowns + part] = _gained(rates, h, i, 3 + part) - change[i, 3 + part]
     solve(factors, rest)
     most = 0.0
     for i in range(STAGES):
@@ -144,14 +141,14 @@ def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, res
 
 
 @njit
-def _follow(turning: bool, physics: Physics, start: Any, h: float, change: Any, rates: Any, scale: Any) -> float:
+def _follow(contact: Contact, start: Any, h: float, change: Any, rates: Any, scale: Any) -> float:
     """Change places and turns as the velocities say; return by how much the turns, over what is tolerated."""
     for stage in range(STAGES):
         rate, moved = rates[stage], change[stage]
         for axis in range(3):
             rate[axis] = start[3 + axis] + moved[3 + axis]
-        if turning:
-            half = 0.5 / physics.inertia
+        if contact.turning:
+            half = 0.5 / contact.physics.inertia
             x, y, z = half * (start[6] + moved[6]), half * (start[7] + moved[7]), half * (start[8] + moved[8])
             a, b, c, d = start[9] + moved[9], start[10] + moved[10], start[11] + moved[11], start[12] + moved[12]
             rate[9], rate[10], rate[11], rate[12] = quaternion_rate(x, y, z, a, b, c, d)
@@ -160,12 +157,10 @@ def _follow(turning: bool, physics: Physics, start: Any, h: float, change: Any, 
         for part in range(SIZE):
             if 3 <= part < 9:
                 continue
-            total = 0.0
-            for j in range(STAGES):
-                total += COUPLING[stage, j] * rates[j, part]
+            gained = _gained(rates, h, stage, part)
             if part >= 9:
-                most = max(most, abs(h * total - change[stage, part]) / scale[part])
-            change[stage, part] = h * total
+                most = max(most, abs(gained - change[stage, part]) / scale[part])
+            change[stage, part] = gained
     return most
 
 

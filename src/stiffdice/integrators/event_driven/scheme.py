@@ -4,9 +4,8 @@ A flight is a parabola and a turn at constant spin; its touch-down is found to r
 the motion obeys smooth equations until a node crosses the ground or the force on one reaches zero (`active_set.py`).
 Each such event is located to round-off, and the integrator starts anew behind it, so that it keeps its order: it is
 Dormand and Prince's method of order 8 (`dop853.py`), or where friction holds a node, whose motion is stiff then,
-Radau's of order 9 (`radau_iia.py`). Steps scale with the contact's time, so that their number does not depend on the
-stiffness. The tolerance is of a step's error, relative to the motion of the contact: to its speed, and to that over its
-frequency as length.
+Radau's of order 9 (`radau_iia.py`). Steps scale with the contact's time. The tolerance is of a step's error, relative
+to the motion of the contact: to its speed, and to that over its frequency as length.
 
 Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.6 (step size, events).
 """
@@ -14,7 +13,8 @@ Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, sections
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -22,73 +22,40 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.event_driven import dop853, radau_iia
-from stiffdice.integrators.event_driven.active_set import (
-    NODES,
-    SIZE,
-    SWITCHES,
-    begin,
-    cross,
-    derivative,
-    fastest,
-    force_free,
-    give,
-    hardness,
-    normalise,
-    passes,
-    switches,
-    take,
-    vanishing,
-)
+from stiffdice.integrators.event_driven import active_set, dop853, radau_iia
+from stiffdice.integrators.event_driven.active_set import NODES, SIZE, SWITCHES, Contact, derivative, passes
 from stiffdice.integrators.event_driven.touchdown import free_time
 from stiffdice.integrators.free_flight import flight
 
-
-class Event(NamedTuple):
-    """The tag of this scheme."""
-
-
+Event = namedtuple("Event", ())
 TAG = Event()
-
-# One step of h, as files tell it.
 FORMULA = (
     "exact flights; contacts by Dormand and Prince's method of order 8 from one event to the next, "
     "Radau's implicit method of order 9 where friction holds a node"
 )
-
-# The velocity is that at the stored place.
-LAG = 0.0
+LAG = 0.0  # the velocity is that at the stored place
 
 OWN_STEPS = True
 
 # So many advances to a touch-down take about as long as an evaluation of the forces.
 _ADVANCES = 4
-
 # An explicit step is not stable for longer than about this over the fastest friction or damping.
 _STIFF = 4.0
-
 # The first step of a contact: about what turns out to be right, as part of its 1/ω, over the tolerance's eighth root.
 _FIRST = 5.0
-
 # Where friction is so many times as fast as the contact it holds a node, or is about to: the slip is of the order of
 # the cutoff then, and must be known to a part of that.
 _HOLDING, _HELD = 1e4, 0.1
-
 # By what a step may exceed the one before.
 _GROWTH = 5.0
-
 # A step is accepted whatever its error once it is shorter than this part of the contact's 1/ω or of all there is to go.
 _SHORTEST = 1e-13
-
 # After so many such steps in a row the motion is beyond doubles, and becomes not-a-number.
 _FORCED = 100
-
 # Times that the location of an event may correct itself; it takes three or four.
 _CORRECTIONS = 30
-
 # Over less than this part of the contact's 1/ω a method of order 4 is exact to round-off.
 _NEAR = 1e-3
-
 
 # What a contact is computed in, one record, which reaches compiled code as a bare pointer (see `state.STATE`). nodes,
 # bits: those of the regime. here, there: the motion at a step's start and end; stages: rates in between. scale: what
@@ -132,7 +99,7 @@ def part(
             left -= free
             work += 1 + advances // _ADVANCES
         if left > 0.0:
-            spent, count = _contact(turning, dragging, physics, state, left, tolerance, max(1, most - work))
+            spent, count = _touch(turning, dragging, physics, state, left, tolerance, max(1, most - work))
             left -= spent
             evaluations += count
             work += count
@@ -140,7 +107,7 @@ def part(
 
 
 @njit(cache=True)
-def _contact(
+def _touch(
     turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int
 ) -> tuple[float, int]:
     """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations.
@@ -149,28 +116,29 @@ def _contact(
     """
     # Kept here while it is used: a record does not keep its array alive.
     room = np.zeros(1, _WORK)
-    return _go_through(turning, dragging, physics, state, most, tolerance, effort, room)
+    contact = Contact(turning, dragging, physics, room[0])
+    return _go_through(contact, state, most, tolerance, effort, room)
 
 
 @njit
 def _go_through(
-    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int, room: Any
+    contact: Contact, state: Any, most: float, tolerance: float, effort: int, room: Any
 ) -> tuple[float, int]:
     work = room[0]
     work.nodes[:] = state.node_offset
     work.scale[:] = 1.0
-    take(turning, state, work.here)
-    vanishing(physics, work.here, work.small)
-    begin(turning, dragging, physics, work.nodes, work.here, work.bits, work.small)
-    _look(turning, dragging, physics, work, work.here, 0, 0)
+    active_set.take(contact.turning, state, work.here)
+    active_set.vanishing(contact.physics, work.here, work.small)
+    active_set.begin(contact, work.here, work.small)
+    _look(contact, work, work.here, 0, 0)
     time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
-    while time < most and evaluations < effort and (dragging or not force_free(work.bits)):
-        hardness(turning, physics, work.nodes, work.bits, work.here, work.hard)
+    while time < most and evaluations < effort and (contact.dragging or np.any(work.bits)):
+        active_set.hardness(contact, work.here, work.hard)
         if h == 0.0:
-            h = _first(physics, work, tolerance)
+            h = _first(contact.physics, work, tolerance)
         pace, slowest = min(h, most - time), max(work.hard[0], 1.0 / most)
-        _tolerate(physics, work, tolerance, pace)
-        error, order, count = _attempt(turning, physics, work, pace)
+        _tolerate(contact.physics, work, tolerance)
+        error, order, count = _attempt(contact, work, pace)
         evaluations += count + 1
         change = min(growth, max(0.2, 0.9 * error ** (-1.0 / order))) if error != 0.0 else growth
         if not error <= 1.0 and pace * slowest > _SHORTEST:
@@ -181,7 +149,7 @@ def _go_through(
         if forced > _FORCED or not math.isfinite(work.small[1]):
             work.here[:] = math.nan
             break
-        _look(turning, dragging, physics, work, work.there, dop853.STAGES, 1)
+        _look(contact, work, work.there, dop853.STAGES, 1)
         lowest = _dip(work, pace)
         if 0.0 < lowest < pace:  # a touch that begins and ends within the step: to be met, or missed, at its deepest
             h = lowest
@@ -189,7 +157,7 @@ def _go_through(
         h = max(h, pace * change) if change > 1.0 else pace * change
         zero = _first_zero(work, pace)
         if zero <= pace and idle <= SWITCHES:
-            end, error, count = _locate(turning, dragging, physics, work, zero, pace)
+            end, error, count = _locate(contact, work, zero, pace)
             evaluations += count
             if not error <= 1.0 and end * slowest > _SHORTEST:
                 h = end / 2  # what a node does that is let go before the event is not seen from beyond it
@@ -197,28 +165,28 @@ def _go_through(
             pace = end
             idle = idle + 1 if pace == 0.0 else 0
         time = most if pace == most - time else time + pace
-        changed = _cross_zeros(turning, dragging, physics, work)
+        changed = _cross_zeros(contact, work)
         _move_on(work)
         if changed:
-            _look(turning, dragging, physics, work, work.here, 0, 0)
+            _look(contact, work, work.here, 0, 0)
         if not math.isfinite(work.here[2]):
             break
-    give(turning, physics, work.nodes, work.here, state)
+    active_set.give(contact.turning, contact.physics, work.nodes, work.here, state)
     return time, evaluations
 
 
 @njit
-def _look(turning: bool, dragging: bool, physics: Physics, work: Any, motion: Any, stage: int, end: int) -> None:
+def _look(contact: Contact, work: Any, motion: Any, stage: int, end: int) -> None:
     """Evaluate rate and switches of the motion at the start of a step (stage 0, end 0) or at its end (the last, 1)."""
     rate = work.stages[stage]
-    derivative(turning, physics, work.nodes, work.bits, motion, rate)
-    switches(turning, dragging, physics, work.nodes, work.bits, motion, rate, work.value[end], work.slope[end])
+    derivative(contact, motion, rate)
+    active_set.switches(contact, motion, rate, work.value[end], work.slope[end])
 
 
 @njit
 def _move_on(work: Any) -> None:
     """Start from where the step ended."""
-    normalise(work.there)
+    active_set.normalise(work.there)
     work.here[:] = work.there
     work.stages[0] = work.stages[dop853.STAGES]
     work.value[0] = work.value[1]
@@ -226,11 +194,11 @@ def _move_on(work: Any) -> None:
 
 
 @njit
-def _tolerate(physics: Physics, work: Any, tolerance: float, h: float) -> None:
-    """Set what error is tolerated of each part of the motion in a step of h [s]."""
+def _tolerate(physics: Physics, work: Any, tolerance: float) -> None:
+    """Set what error is tolerated of each part of the motion in a step."""
     here, scale, hard = work.here, work.scale, work.hard
-    vanishing(physics, here, work.small)
-    speed = fastest(physics, here)
+    active_set.vanishing(physics, here, work.small)
+    speed = active_set.fastest(physics, here)
     if hard[0] * physics.reach > hard[2]:
         length, pace = hard[2] / hard[0], hard[2]
     else:
@@ -253,19 +221,14 @@ def _first(physics: Physics, work: Any, tolerance: float) -> float:
 
 
 @njit
-def _attempt(turning: bool, physics: Physics, work: Any, h: float) -> tuple[float, int, int]:
+def _attempt(contact: Contact, work: Any, h: float) -> tuple[float, int, int]:
     """Step by h [s]; return the error over what is tolerated, the order of its estimate, and evaluations."""
     if work.hard[1] * h > _STIFF:
-        error, count = radau_iia.step(
-            turning, physics, work.nodes, work.bits, work.here, work.stages[0], h, work.there, work.scale
-        )
+        error, count = radau_iia.step(contact, work.here, h, work.there, work.scale)
         return error, radau_iia.ORDER, count
-    dop853.step(turning, physics, work.nodes, work.bits, work.here, h, work.stages, work.there)
-    return (
-        dop853.error(work.stages, work.scale, h, work.nothing, work.sums),
-        dop853.ORDER,
-        dop853.STAGES - 1,
-    )
+    dop853.step(contact, work.here, h, work.stages, work.there)
+    error = dop853.error(work.stages, work.scale, h, work.nothing, work.sums)
+    return error, dop853.ORDER, dop853.STAGES - 1
 
 
 @njit
@@ -322,9 +285,7 @@ def _first_zero(work: Any, h: float) -> float:
 
 
 @njit
-def _locate(
-    turning: bool, dragging: bool, physics: Physics, work: Any, when: float, most: float
-) -> tuple[float, float, int]:
+def _locate(contact: Contact, work: Any, when: float, most: float) -> tuple[float, float, int]:
     """Step to the first zero of a switch, which is about at `when` [s]; return when exactly, the error, evaluations.
 
     The error is infinite where none was found.
@@ -332,14 +293,14 @@ def _locate(
     evaluations, change, error, hardest = 0, math.inf, 0.0, max(work.hard[0], work.hard[1])
     for _ in range(_CORRECTIONS):
         if abs(change) * hardest < _NEAR:
-            _shift(turning, physics, work, change)
+            _shift(contact, work, change)
             evaluations += 4
         else:
-            error, _, count = _attempt(turning, physics, work, when)
+            error, _, count = _attempt(contact, work, when)
             evaluations += count + 1
         if not error <= 1.0:
             break
-        _look(turning, dragging, physics, work, work.there, dop853.STAGES, 1)
+        _look(contact, work, work.there, dop853.STAGES, 1)
         better = min(most, max(0.0, when + _correction(work, when)))
         if better == when:
             return when, error, evaluations
@@ -348,14 +309,14 @@ def _locate(
 
 
 @njit
-def _shift(turning: bool, physics: Physics, work: Any, h: float) -> None:
+def _shift(contact: Contact, work: Any, h: float) -> None:
     """Move the end of the step by h [s], so short that the classical method of Runge and Kutta is exact."""
     stages, there, trial = work.stages, work.there, work.stages[1]
     first, weights = dop853.STAGES, (0.5, 1.0, 0.0)
     for part in range(SIZE):
         trial[part] = there[part] + 0.5 * h * stages[first, part]
     for stage in range(3):
-        derivative(turning, physics, work.nodes, work.bits, trial, stages[2 + stage])
+        derivative(contact, trial, stages[2 + stage])
         for part in range(SIZE):
             trial[part] = there[part] + weights[stage] * h * stages[2 + stage, part]
     for part in range(SIZE):
@@ -382,13 +343,13 @@ def _correction(work: Any, when: float) -> float:
 
 
 @njit
-def _cross_zeros(turning: bool, dragging: bool, physics: Physics, work: Any) -> bool:
+def _cross_zeros(contact: Contact, work: Any) -> bool:
     """Change the regime for every switch that fell to zero in a step; return whether one did."""
     crossed = False
     for node in range(NODES):
         for switch in (2 * node, 2 * node + 1):
             if _falls_to_zero(work, switch):
-                cross(turning, dragging, physics, work.nodes, work.there, work.bits, switch)
+                active_set.cross_zero(contact, work.there, switch)
                 crossed = True
                 break
     return crossed

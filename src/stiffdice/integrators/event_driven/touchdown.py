@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import height_of, speed_of, upward
+from stiffdice.dynamics.contact import height_of, normal_of, speed_of, upward
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.vector import Vector, cross, dot, norm, row, vector
+from stiffdice.integrators.free_flight import landing
 
 # Enough for any touch-down; a node that grazes the ground so long is taken to touch it.
 _ADVANCES = 1000
@@ -26,16 +28,6 @@ _ULPS = 4 * 2.0**-52
 # A node that a contact has let go may be below the ground by the round-off that `active_set.py` allows, and a little
 # more: were it taken to touch, neither flight nor contact would ever move it.
 _BELOW = 4
-
-
-@njit
-def _earliest(clearance: float, speed: float, pull: float) -> float:
-    """Return the time [s] after which c + c' s − pull s²/2 is zero, not negative; infinite if it never is."""
-    clearance = max(0.0, clearance)
-    if pull > 0.0:
-        root = math.sqrt(speed * speed + 2 * pull * clearance)
-        return (speed + root) / pull if speed > 0.0 else 2 * clearance / (root - speed) if root > speed else 0.0
-    return clearance / -speed if speed < 0.0 else math.inf
 
 
 @njit
@@ -49,15 +41,15 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[fl
     height, speed = height_of(physics, state), speed_of(physics, state)
     time = 0.0
     if height > physics.reach:
-        time = _earliest(height - physics.reach, speed, pull)
+        time = landing(pull, height - physics.reach, speed)
         if time >= most:
             return most, 0
-    spin = state.angular_momentum
-    wx, wy, wz = spin[0] / physics.inertia, spin[1] / physics.inertia, spin[2] / physics.inertia
-    rate = math.sqrt(wx * wx + wy * wy + wz * wz) if models.turns(model) else 0.0
-    parts = _level_parts(physics, state, rate, wx, wy, wz)
-    place = state.position
-    length = abs(physics.nx * place[0]) + abs(physics.ny * place[1]) + abs(physics.nz * place[2])
+    momentum = vector(state.angular_momentum)
+    spin = Vector(momentum.x / physics.inertia, momentum.y / physics.inertia, momentum.z / physics.inertia)
+    rate = norm(spin) if models.turns(model) else 0.0
+    parts = _level_parts(physics, state, rate, spin)
+    n, place = normal_of(physics), vector(state.position)
+    length = abs(n.x * place.x) + abs(n.y * place.y) + abs(n.z * place.z)
     small = _ULPS * (length + abs(speed) * time + physics.reach)
     advances = 0
     while advances < _ADVANCES:
@@ -71,7 +63,7 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[fl
             turning = rate * (cosine * parts[k, 2] - sine * parts[k, 1])
             touches = touches or clearance < -_BELOW * small or (clearance <= small and rising + turning < 0.0)
             hardest = pull + rate * rate * parts[k, 3]
-            pace = min(pace, _earliest(clearance, rising + turning, hardest))
+            pace = min(pace, landing(hardest, max(0.0, clearance), rising + turning))
         if touches:
             break
         time += pace
@@ -81,19 +73,17 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[fl
 
 
 @njit
-def _level_parts(physics: Physics, state: Any, rate: float, wx: float, wy: float, wz: float) -> Any:
+def _level_parts(physics: Physics, state: Any, rate: float, spin: Vector) -> Any:
     """Return the nodes' levels [m] as constant, cosine and sine of the angle turned, and the latters' amplitude."""
-    nodes = state.node_offset
-    parts = np.zeros((nodes.shape[0], 4))
-    for k in range(nodes.shape[0]):
-        x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        level = upward(physics, x, y, z)
+    parts = np.zeros((len(state.node_offset), 4))
+    for k in range(len(parts)):
+        node = row(state.node_offset, k)
+        level = upward(physics, node)
         if rate == 0.0:
             parts[k, 0] = level
             continue
-        ax, ay, az = wx / rate, wy / rate, wz / rate
-        on_axis = (ax * x + ay * y + az * z) * upward(physics, ax, ay, az)
-        parts[k, 0], parts[k, 1] = on_axis, level - on_axis
-        parts[k, 2] = upward(physics, ay * z - az * y, az * x - ax * z, ax * y - ay * x)
+        axis = Vector(spin.x / rate, spin.y / rate, spin.z / rate)
+        on_axis = dot(axis, node) * upward(physics, axis)
+        parts[k, 0], parts[k, 1], parts[k, 2] = on_axis, level - on_axis, upward(physics, cross(axis, node))
         parts[k, 3] = math.hypot(parts[k, 1], parts[k, 2])
     return parts

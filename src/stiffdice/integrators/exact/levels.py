@@ -7,6 +7,7 @@ from typing import Any
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import upward
 from stiffdice.dynamics.state import Array, Physics
+from stiffdice.dynamics.vector import row
 
 # Rows of the table of levels, lowest first: height above the lowest [m], how many nodes are on those below, and the sum
 # of their heights [m].
@@ -20,9 +21,9 @@ _LEVEL = 2.0**-48
 def fill(physics: Physics, state: Any, table: Array) -> tuple[int, float]:
     """Fill the table of levels; return how many there are, and the lowest's height above the centre [m]."""
     heights = table[HEIGHT]
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        height = upward(physics, nodes[k, 0], nodes[k, 1], nodes[k, 2])
+    count = len(state.node_offset)
+    for k in range(count):
+        height = upward(physics, row(state.node_offset, k))
         place = k
         while place > 0 and heights[place - 1] > height:
             heights[place] = heights[place - 1]
@@ -30,8 +31,8 @@ def fill(physics: Physics, state: Any, table: Array) -> tuple[int, float]:
         heights[place] = height
     table[BELOW, 0] = table[SUM, 0] = 0.0
     levels, start, lowest = 0, 0, 0.0
-    for k in range(1, nodes.shape[0] + 1):
-        if k < nodes.shape[0] and heights[k] - heights[k - 1] <= _LEVEL * physics.reach:
+    for k in range(1, count + 1):
+        if k < count and heights[k] - heights[k - 1] <= _LEVEL * physics.reach:
             continue
         mean = 0.0
         for member in range(start, k):

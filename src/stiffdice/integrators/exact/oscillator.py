@@ -84,15 +84,16 @@ def first_zero(omega: Any, beta: float, value: float, slope: float) -> float:
 
 
 @njit
+def _gap(motion: Oscillator, by_place: float, by_speed: float, value: Any, t: float) -> tuple[float, float]:
+    """Return value + by_place·z + by_speed·z' at time t [s], and its slope."""
+    moved, speed = after(motion, t)
+    pace = motion.push - motion.omega * motion.omega * moved - 2 * motion.beta * speed
+    return value + by_place * moved + by_speed * speed, by_place * speed + by_speed * pace
+
+
+@njit
 def passing(
-    motion: Oscillator,
-    by_place: float,
-    by_speed: float,
-    value: Any,
-    sign: float,
-    low: float,
-    high: float,
-    guess: float,
+    motion: Oscillator, by_place: float, by_speed: float, value: Any, sign: float, low: float, high: float, guess: float
 ) -> float:
     """Return when [s] sign·(value + by_place·z + by_speed·z') becomes positive, to round-off.
 
@@ -100,34 +101,28 @@ def passing(
     Newton's method from a guess [s], or a secant if that is out of bounds; bisection where it leaves the bracket or is
     slow.
     """
-    t, stride = high, math.inf
-    at_high = 0.0
-    for k in range(200):
-        moved, speed = after(motion, t)
-        gap = sign * (value + by_place * moved + by_speed * speed)
-        if k == 0:
-            if not gap > 0.0:
-                return math.inf
-            at_high, t = gap, low
-            continue
-        if k == 1:
-            if gap >= 0.0:
-                return low
-            stride = high - low
-            t = guess if low < guess < high else low + stride * (gap / (gap - at_high))
-        else:
-            if gap < 0.0:
-                low = t
-            else:
-                high = t
-            pace = motion.push - motion.omega * motion.omega * moved - 2 * motion.beta * speed
-            step = -gap / (sign * (by_place * speed + by_speed * pace))
-            if not abs(step) < stride / 2:
-                step = low + (high - low) / 2 - t
-            stride = abs(step)
-            if stride <= 2.0**-52 * t or gap == 0.0:
-                break
-            t += step
+    at_high = sign * _gap(motion, by_place, by_speed, value, high)[0]
+    at_low = sign * _gap(motion, by_place, by_speed, value, low)[0]
+    if not at_high > 0.0:
+        return math.inf
+    if at_low >= 0.0:
+        return low
+    stride = high - low
+    t = guess if low < guess < high else low + stride * (at_low / (at_low - at_high))
+    for _ in range(200):
         if not low < t < high:
             t = low + (high - low) / 2
+        gap, slope = _gap(motion, by_place, by_speed, value, t)
+        gap *= sign
+        if gap < 0.0:
+            low = t
+        else:
+            high = t
+        step = -gap / (sign * slope)
+        if not abs(step) < stride / 2:
+            step = low + (high - low) / 2 - t
+        stride = abs(step)
+        if stride <= 2.0**-52 * t or gap == 0.0:
+            break
+        t += step
     return t

@@ -27,8 +27,8 @@ _KRONROD = (
     (0.991455371120812639, 0.022935322010529225, 0.0),
 )
 
-# The two rules may differ by this much of the way: of a smooth function Kronrod's error is then, as the 23rd power of
-# what the other's is the 14th, below round-off. Smooth is speed + cutoff over spans in which it does not halve.
+# The two rules may differ by this much of the way: Kronrod's error of a smooth function is then below round-off. Smooth
+# is speed + cutoff over spans in which it does not halve.
 _APART = 1e-10
 
 

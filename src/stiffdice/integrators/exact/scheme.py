@@ -11,50 +11,40 @@ zero of a function known in closed form, and so are the zeros of its derivative:
 first event is bracketed, never stepped over. Friction on level ground follows from the normal impulse
 (`regularised_friction.py`).
 
-Motion that repeats is taken at once: a cube that swings about its rest without leaving the ground loses the same share
-of its amplitude in every cycle, as the forces are then homogeneous in place and speed; without damping every bounce
-takes equally long. What is left of a swing below the round-off of the place is taken for rest.
+Swings about the rest that never leave the ground are taken at once: each cycle loses the same share of the amplitude,
+as the forces are then homogeneous in place and speed. What is left of a swing below the round-off of the place is rest.
 
-A step of any length is exact, to round-off and what the motion makes of that. Stored in a state, a place has an error
-of half a unit in the last place, which deep in a contact is as much as ω times that in the speed: few long steps are
-more precise than many short ones.
+A step of any length is exact, to round-off and what the motion makes of that. A stored place is off by half a unit in
+the last place, which deep in a contact is as much as ω times that in the speed: long steps are more precise.
 """
 
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import drags, height_of, split
+from stiffdice.dynamics.contact import drags, height_of, normal_of, split
 from stiffdice.dynamics.state import TURNING, Array, Physics
+from stiffdice.dynamics.vector import vector
 from stiffdice.integrators.exact.levels import BELOW, HEIGHT, SUM, fill
 from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, passing
 from stiffdice.integrators.exact.regularised_friction import along, evenly
-from stiffdice.integrators.free_flight import flight
+from stiffdice.integrators.free_flight import flight, landing
 from stiffdice.scene.scene import Scene
 
-
-class Exact(NamedTuple):
-    """The tag of this scheme."""
-
-
+Exact = namedtuple("Exact", ())
 TAG = Exact()
-
-# One step of h, as files tell it.
 FORMULA = "parabolas and damped oscillations in closed form, from one event to the next"
-
-# The velocity is that at the stored place.
-LAG = 0.0
+LAG = 0.0  # the velocity is that at the stored place
 
 # A cube that stands still, and is as near to touching the ground in units of its height, touches it.
 _LAID = 2.0**-51
-
 # A cube whose acceleration is as much less than the forces that cancel in it is at rest.
 _STILL = 2.0**-50
-
 # Cycles of a cube that slides are taken at once if that changes less of the way.
 _UNSEEN = 1e-15
 
@@ -84,8 +74,7 @@ class _Course(NamedTuple):
     """Where the cube is, how fast it is, and what is left to do.
 
     c: clearance of the lowest level [m]. u: speed along the normal [m/s]. j: how many levels press. slip [m/s] and way
-    [m]: along the ground. left: of the time [s], and `lost` of that in rounding. lap: time since an undamped cube was
-    lowest [s], negative before it was. event: that the last piece ended with.
+    [m]: along the ground. left: of the time [s], and `lost` of that in rounding. event: that the last piece ended with.
     """
 
     c: float
@@ -95,7 +84,6 @@ class _Course(NamedTuple):
     way: float
     left: float
     lost: float
-    lap: float
     event: int
 
 
@@ -126,14 +114,15 @@ def part(
     most: pieces at most.
     """
     fall = physics.weight / physics.mass
-    pull = fall * physics.nz
+    normal = normal_of(physics)
+    pull = fall * normal.z
     height = height_of(physics, state)
-    u, tx, ty, tz = split(physics, state.velocity[0], state.velocity[1], state.velocity[2])
+    u, along_ground = split(physics, vector(state.velocity))
     dragging = physics.damping > 0.0 and drags(law)
     if not dragging and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
         flight(model, physics, state, h, 1, LAG)
         return 0.0, 1, 1
-    slip = math.hypot(math.hypot(tx, ty), tz) if physics.friction > 0.0 else 0.0
+    slip = math.hypot(math.hypot(along_ground.x, along_ground.y), along_ground.z) if physics.friction > 0.0 else 0.0
     table = np.empty((3, 9))
     levels, lowest = fill(physics, state, table)
     before = height + lowest
@@ -142,7 +131,6 @@ def part(
     end, pieces = _advance(_ground_of(physics, dragging, pull, levels), table, start, u, slip, h, most)
     c, u, h = end.c, end.u, h - max(0.0, end.left)
     share, time = (end.slip / slip, end.way / slip) if slip > 0.0 else (1.0, h)
-    normal, along_ground = (physics.nx, physics.ny, physics.nz), (tx, ty, tz)
     # Gravity along the ground: none where there is friction.
     slope = pull * physics.nx, pull * physics.ny, pull * physics.nz - fall
     for axis in range(3):
@@ -160,17 +148,9 @@ def part(
 def _ground_of(physics: Physics, drags: bool, pull: float, levels: int) -> _Ground:
     stiffness, damping = physics.stiffness, physics.damping
     both = stiffness + damping
-    return _Ground(
-        math.sqrt(stiffness) / math.sqrt(physics.mass),
-        damping / physics.mass / 2,
-        drags,
-        pull,
-        stiffness / both if both > 0.0 else 1.0,
-        damping / both if both > 0.0 else 0.0,
-        physics.friction,
-        physics.cutoff,
-        levels,
-    )
+    by_place, by_speed = (stiffness / both, damping / both) if both > 0.0 else (1.0, 0.0)
+    frequency, decay = math.sqrt(stiffness) / math.sqrt(physics.mass), damping / physics.mass / 2
+    return _Ground(frequency, decay, drags, pull, by_place, by_speed, physics.friction, physics.cutoff, levels)
 
 
 @njit
@@ -194,14 +174,14 @@ def _advance(
 
     slip [m/s]: along the ground; zero where there is no friction. Return where that ends, and pieces.
     """
-    now = _Course(c, u, _pressing(ground, table, c, u), slip, 0.0, h, 0.0, -1.0, _NONE)
+    now = _Course(c, u, _pressing(ground, table, c, u), slip, 0.0, h, 0.0, _NONE)
     pieces = 0
     while now.left > 0.0 and pieces < most:
         pieces += 1
         if now.u == 0.0:
             now = _wait(ground, table, now)
         free = now.j == 0 and now.c >= 0.0 and not ground.drags
-        t = _landing(ground.pull, now.c, now.u) if free else math.inf
+        t = landing(ground.pull, now.c, now.u) if free else math.inf
         if t < now.left:
             now = _land(ground, now, t)
         elif now.left > 0.0:
@@ -217,13 +197,13 @@ def _springs(ground: _Ground, table: Array, j: int, c: float) -> float:
 
 @njit
 def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
-    """Take what is known ahead of a cube that stands still for a moment: rest, swings about it, or whole bounces."""
+    """Take what is known ahead of a cube that stands still for a moment: rest, or swings about it."""
     omega = math.sqrt(table[BELOW, now.j]) * ground.frequency
     springs = _springs(ground, table, now.j, now.c)
     push = springs - ground.pull
     if abs(push) <= _STILL * (abs(ground.pull) + omega * omega * abs(now.c)):
         slip, slipped = evenly(now.slip, ground.cutoff, ground.friction * springs, now.left)
-        return _Course(now.c, 0.0, now.j, slip, now.way + slipped, 0.0, 0.0, now.lap, _NONE)
+        return _Course(now.c, 0.0, now.j, slip, now.way + slipped, 0.0, 0.0, _NONE)
     cycles, period, decay = _cycles(ground, table, now.j, now.c, push, now.slip, now.left)
     if cycles > 0.0:
         moved = -push / omega / omega * math.expm1(-cycles * decay)
@@ -231,11 +211,8 @@ def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
         way = now.way + slipped - (ground.friction * moved if slip > 0.0 else 0.0)
         left = now.left - cycles * period
         left = now.left % period if left < period else left  # without rounding, where these are all that fit
-        return _Course(now.c + moved, 0.0, now.j, slip, way, left, 0.0, now.lap, _NONE)
-    if not (push > 0.0 and ground.decay == 0.0 and now.slip == 0.0):
-        return now
-    left, lost = (now.left % now.lap, 0.0) if now.lap > 0.0 else (now.left, now.lost)
-    return _Course(now.c, 0.0, now.j, 0.0, now.way, left, lost, 0.0, _NONE)
+        return _Course(now.c + moved, 0.0, now.j, slip, way, left, 0.0, _NONE)
+    return now
 
 
 @njit
@@ -243,7 +220,7 @@ def _land(ground: _Ground, now: _Course, t: float) -> _Course:
     """Fly on to the ground, which the cube meets after t [s]."""
     u = -math.sqrt(max(0.0, now.u * now.u + 2 * ground.pull * now.c))
     left, lost = _later(now, t)
-    return _Course(0.0, u, 1, now.slip, now.way + now.slip * t, left, lost, _lap(now, t), _TOUCH)
+    return _Course(0.0, u, 1, now.slip, now.way + now.slip * t, left, lost, _TOUCH)
 
 
 @njit
@@ -269,7 +246,7 @@ def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
         if t > 0.0 and (event == _TOUCH or ground.decay == 0.0):
             c = -table[HEIGHT, min(j, now.j)]
     left, lost = _later(now, t)
-    return _Course(c, u, j, slip, now.way + slipped, left, lost, _lap(now, t), event)
+    return _Course(c, u, j, slip, now.way + slipped, left, lost, event)
 
 
 @njit
@@ -281,26 +258,12 @@ def _later(now: _Course, t: float) -> tuple[float, float]:
 
 
 @njit
-def _lap(now: _Course, t: float) -> float:
-    return now.lap + t if now.lap >= 0.0 else now.lap
-
-
-@njit
-def _landing(pull: Any, c: float, u: float) -> float:
-    """Return when [s] a body in free flight at a clearance c [m] and a speed u [m/s] meets the ground."""
-    square = u * u + 2 * pull * c
-    if u < 0.0:
-        return 2 * c / (math.sqrt(square) - u) if square >= 0.0 else math.inf
-    return (u + math.sqrt(square)) / pull if pull > 0.0 else math.inf
-
-
-@njit
 def _sink(table: Array, motion: Any, j: int, levels: int, c: float, end: float) -> tuple[float, int]:
     """Return when [s] the first event of a falling cube is, at `end` at the latest, and which."""
     if j < levels:
         gap = c + table[HEIGHT, j]
         pace = motion.push - 2 * motion.beta * motion.speed
-        t = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, end, _landing(-pace, max(0.0, gap), motion.speed))
+        t = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, end, landing(-pace, max(0.0, gap), motion.speed))
         if t <= end:
             return t, _TOUCH
     return end, _NONE

@@ -82,8 +82,8 @@ def _extremes(panel: Any, dataset: xr.Dataset) -> None:
     fine = np.geomspace(scan[0], scan[-1], int(_FINE * np.log10(scan[-1] / scan[0])))
     peak = np.array([linear_theory.largest_gain(value) for value in fine])
     for kind, measured, curve in (
-        ("loss", -dataset.smallest_gain, 1 - 1 / peak),
-        ("gain", dataset.largest_gain, peak - 1),
+        ("loss", dataset.energy_gain.min("phase"), 1 - 1 / peak),
+        ("gain", dataset.energy_gain.max("phase"), peak - 1),
     ):
         panel.plot(scan, np.abs(measured), linestyle="none", label=f"largest {kind}", **_LOOKS[kind])
         panel.plot(fine, curve, color=_LOOKS[kind]["color"], linewidth=0.5, label=f"largest {kind} by theory", zorder=2)

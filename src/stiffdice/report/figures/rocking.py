@@ -49,7 +49,8 @@ def _limits(panel: Any, dataset: xr.Dataset) -> None:
     panel.plot(fine, [linear_theory.stability_limit(value) for value in fine], **style.THEORY)
     for (i, inertia), (k, mode) in _named(dataset.inertia, dataset.mode):
         _marks(panel, zeta, dataset.limit.values[i, k], mode, inertia)
-    error = readable(np.abs(dataset.limit_error.values).max(), digits=2)
+    theory = np.array([linear_theory.stability_limit(value) for value in zeta])
+    error = readable(np.abs(dataset.limit.values / theory - 1).max(), digits=2)
     style.write_in_corner(panel, 0.98, f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}")
     panel.set_title("One limit in units of each mode's own ω")
     panel.set(xlabel="damping ratio ζ of the mode [1]", ylabel="measured limit ωh [1]")
@@ -65,7 +66,7 @@ def _longest_steps(panel: Any, dataset: xr.Dataset) -> None:
     least = int(dataset.zeta.values.argmin())
     modes = [mode.replace("_", " ") for mode in meanings_of(dataset.mode)]
     steps, numbers = dataset.longest_step.values[:, :, least], dataset.mode_number_theory.values
-    predicted = float(dataset.limit_theory[least]) / np.sqrt(numbers)
+    predicted = linear_theory.stability_limit(float(dataset.zeta[least])) / np.sqrt(numbers)
     for i, inertia in enumerate(meanings_of(dataset.inertia)):
         worst, at = int(steps[i].argmin()), steps[i].min()
         color = _LOOKS[meanings_of(dataset.mode)[worst]]["color"]

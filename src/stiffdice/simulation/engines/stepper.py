@@ -39,10 +39,10 @@ def dearness(method: str) -> float:
     return PEERS[method].dearness if method in PEERS else 1.0
 
 
-def chosen_from(names: Sequence[str]) -> list[str]:
-    """Return these methods; raises InputError for one that is not known, or not installed."""
+def chosen_from(names: Sequence[str], allowed: Sequence[str] = (*schemes.SCHEMES, *ENGINES)) -> list[str]:
+    """Return these methods; raises InputError for one that is not allowed, or not installed."""
     for name in names:
-        if validation.choice("methods", name, (*schemes.SCHEMES, *ENGINES)) in ENGINES:
+        if validation.choice("methods", name, allowed) in PEERS:
             engines.adapter_of(name, "methods")
     return list(names)
 
