@@ -174,10 +174,11 @@ def found_by(name, planned, kind):
 def data_of_figure(wildcards):
     """Return the files a figure is drawn from: a run in each preset, or what sweeps or experiments found."""
     planned = planned_figure(wildcards)
-    if planned.run is None:
+    if DRAWINGS[planned.draw].given != "runs":
         return found_by(wildcards.study, planned, DRAWINGS[planned.draw].given)
-    presets = study(wildcards.study).runs[planned.run].presets
-    return {preset: f"results/{wildcards.study}/runs/{planned.run}.{preset}.h5" for preset in presets}
+    (run,) = planned.of
+    presets = study(wildcards.study).runs[run].presets
+    return {preset: f"results/{wildcards.study}/runs/{run}.{preset}.h5" for preset in presets}
 
 
 def data_of_table(wildcards):

@@ -48,10 +48,10 @@ def add(commands: common.Commands) -> None:
 
 
 def _status(options: argparse.Namespace) -> int:
-    from stiffdice.errors import InputError
+    from stiffdice.scene import validation
 
-    if options.cores is not None and options.cores < 1:
-        raise InputError(f"--cores = {options.cores}: allowed is a whole number from 1")
+    if options.cores is not None:
+        validation.count("--cores", options.cores)
     if options.watch:
         return _watch(options)
     found = _found(options)
@@ -70,16 +70,12 @@ def _found(options: argparse.Namespace) -> list[Status]:
         raise InputError(f"{SCHEMA}: No such file; call stiffdice status in the project's folder")
     if options.study is not None and not study.NAME.fullmatch(options.study):
         raise InputError(f"STUDY = {options.study}: allowed is the name of a file in config/, without .yaml")
-    names = [options.study] if options.study is not None else _with_results()
+    made = (path.stem for path in sorted(Path("config").glob("*.yaml")) if Path("results", path.stem).is_dir())
+    names = [options.study] if options.study is not None else list(made)
     with told_if_slow("planning the sweeps"):
         return [
             status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name), options.cores) for name in names
         ]
-
-
-def _with_results() -> list[str]:
-    named = sorted(path.stem for path in Path("config").glob("*.yaml"))
-    return [name for name in named if Path("results", name).is_dir()]
 
 
 def _tell(found: list[Status], options: argparse.Namespace) -> None:
@@ -113,7 +109,10 @@ def _watch(options: argparse.Namespace) -> int:
     with contextlib.suppress(KeyboardInterrupt):
         while True:
             found = _found(options)
-            _clear(options)
+            if sys.stdout.isatty():
+                print("\x1b[H\x1b[J", end="")  # from the top of an empty screen
+            elif not options.json:
+                print()
             _tell(found, options)
             running = any(status.those(State.RUNNING) for status in found)
             seen, quiet, ended = seen or running, 0 if running else quiet + 1, _exit_status(found)
@@ -121,11 +120,3 @@ def _watch(options: argparse.Namespace) -> int:
                 break
             time.sleep(SECONDS)
     return ended
-
-
-def _clear(options: argparse.Namespace) -> None:
-    """Begin at the top of an empty screen, or after an empty line."""
-    if sys.stdout.isatty():
-        print("\x1b[H\x1b[J", end="")
-    elif not options.json:
-        print()

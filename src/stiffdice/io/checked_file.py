@@ -13,7 +13,7 @@ import numpy as np
 
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import seal, structure_check
-from stiffdice.io.structure_check import Contents
+from stiffdice.io.structure_check import Contents, Variable
 
 
 @contextmanager
@@ -47,16 +47,14 @@ def told(path: str | Path) -> Iterator[None]:
         raise RefusedError(f"{path}: not a readable HDF5 file ({reason})") from None
 
 
-def check_values(contents: Contents, name: str, values: np.ndarray[Any, Any]) -> None:
+def check_values(name: str, variable: Variable, values: np.ndarray[Any, Any]) -> None:
     """Raise RefusedError at a coordinate that is not finite, and at an enum's value that has no word.
 
     Results may well be NaN or infinite: runs blow up.
     """
-    if not values.size:
-        return
-    if name in contents.coordinates and values.dtype.kind == "f" and not np.isfinite(values).all():
+    if variable.is_coordinate and values.dtype.kind == "f" and not np.isfinite(values).all():
         raise RefusedError(f"{name}: a coordinate that is not finite")
-    count = contents.meanings.get(name)
-    if count is not None and not (values.min() >= 0 and values.max() < count):
-        wrong = values[(values < 0) | (values >= count)].flat[0]
-        raise RefusedError(f"{name} = {wrong}: allowed is 0 to {count - 1}, which have a word in flag_meanings")
+    if variable.words and (wrong := values[(values < 0) | (values >= variable.words)]).size:
+        raise RefusedError(
+            f"{name} = {wrong.flat[0]}: allowed is 0 to {variable.words - 1}, which have a word in flag_meanings"
+        )
