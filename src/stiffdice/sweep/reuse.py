@@ -20,7 +20,7 @@ from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
 from stiffdice.sweep.grid import Column, Piece, Sweep
-from stiffdice.sweep.shard import shard_pattern
+from stiffdice.sweep.shard import differing, shard_pattern
 
 Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], steps
 
@@ -88,11 +88,9 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
 
     It saves opening all shards in every job, and decides no more than that; stiffness has six digits in it.
     """
-    grounds = [piece.column.stiffness for piece in pieces]
-    steps = [count for piece in pieces for count in piece.steps]
-    wanted = (
-        {"stiffness_{}_kg_s-2": (min(grounds), max(grounds)), "steps_{}": (min(steps), max(steps))} if steps else {}
-    )
+    stiffness, steps = [part.column.stiffness for part in pieces], [count for part in pieces for count in part.steps]
+    spans = {"stiffness_{}_kg_s-2": stiffness, "steps_{}": steps} if steps else {}
+    wanted = {name: (min(places), max(places)) for name, places in spans.items()}
     try:
         return {
             row["shard"]
@@ -108,5 +106,5 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
 def _cells_of(path: Path, like: xr.Dataset) -> Iterator[Cell]:
     """Yield the cells of a shard if its runs are those of another; raises InputError if it cannot be trusted."""
     attributes, cells = reader.head(path, CELL)
-    if {key: str(value) for key, value in attributes.items()} == {key: str(value) for key, value in like.attrs.items()}:
+    if not differing(attributes, like.attrs):
         yield from zip(*(cells[name].tolist() for name in CELL), strict=True)
