@@ -7,7 +7,7 @@ rule experiment:
     output:
         "results/{study}/experiments/{experiment}.h5",
     params:
-        experiment=lambda wildcards: planned_experiment(wildcards),
+        experiment=planned("experiment"),
         asked=asked_of("experiment", "{experiment}"),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
@@ -31,7 +31,7 @@ rule timing:
     output:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
-        experiment=lambda wildcards: planned_timing(wildcards),
+        experiment=planned("timing"),
         asked=asked_of("timings", "{timing}"),
     log:
         "results/{study}/logs/timings/{timing}.log",

@@ -7,7 +7,7 @@ rule trajectory:
     output:
         "results/{study}/runs/{run}.{preset}.h5",
     params:
-        run=lambda wildcards: planned_run(wildcards),
+        run=planned("run"),
         asked=asked_of("trajectory", "{run}.{preset}"),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",

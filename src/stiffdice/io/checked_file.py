@@ -23,9 +23,7 @@ def opened(path: str | Path) -> Iterator[tuple[h5py.File, Contents]]:
     about = place.stat()
     if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
         raise InputError("is not a regular file")  # a pipe would be waited for
-    sealed = seal.is_sealed(place)
-    if sealed:
-        seal.check(place)
+    sealed = seal.check(place)
     with h5py.File(place, "r") as file:
         structure_check.check_version(file, sealed)
         yield file, structure_check.check(file, about.st_size)

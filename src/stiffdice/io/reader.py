@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from os import PathLike
@@ -31,8 +29,10 @@ def open_file(path: str | Path) -> xr.Dataset:
     What is not ours is refused before a value is read (`io.structure_check`), damage by its seal. A file from elsewhere
     is to be tried in another process before (`io.isolation`).
     """
+    import psutil
+
     with told(path), opened(path) as (file, contents):
-        size, memory = sum(variable.size for variable in contents.variables.values()), _memory()
+        size, memory = sum(variable.size for variable in contents.variables.values()), psutil.virtual_memory().total
         if size > memory:
             raise InputError(f"holds {size / 1e9:.3g} GB: this machine has {memory / 1e9:.3g} GB of memory")
         return _dataset(contents, {name: _values(file, contents, name) for name in contents.variables})
@@ -104,14 +104,6 @@ def _cells_at_once(file: h5py.File, contents: Contents, members: int) -> int:
     )
     together = max(chunks, default=1)
     return together * max(1, RUNS_AT_ONCE // (together * max(1, members)))
-
-
-def _memory() -> float:
-    """Return how many bytes of memory this machine has; no bound where it does not say."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return math.inf
 
 
 def _sizes(file: h5py.File, contents: Contents) -> dict[str, int]:
