@@ -154,7 +154,7 @@ def _dimensions(
 ) -> dict[str, tuple[str, ...]]:
     """Return the names of the axes; raises RefusedError unless each is a dimension of the file, and as long."""
     places = {h5py.h5o.get_info(datasets[name].id).addr: name for name in scales}
-    dimensions = {name: (name,) for name in scales}
+    dimensions: dict[str, tuple[str, ...]] = {name: (name,) for name in scales}
     for name, dataset in datasets.items():
         if name in scales:
             if dataset.ndim != 1:

@@ -106,6 +106,7 @@ def other(asked: Asked, told: job_log.Told | None) -> str:
 
 def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
     """Return the digest of a result's scene, its plan as plain data, and the modules that this names."""
+    plan: list[Any]
     name, _, part = result.name.partition("." if result.stage == "trajectory" else "/")
     match result.stage:
         case "trajectory":

@@ -24,7 +24,7 @@ def check(data: object, schema: str | Path, source: str) -> None:
     import jsonschema  # which takes a while to import
 
     numbers = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number)
-    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)
+    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)  # type: ignore[no-untyped-call]
     error = jsonschema.exceptions.best_match(kind(_filled(yaml_loader.load(schema))).iter_errors(data))
     if error is not None:
         raise InputError(f"{source}: {_reason(error)}")

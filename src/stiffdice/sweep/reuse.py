@@ -8,6 +8,7 @@ scheme and members are used, and of these only what is whole.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
 from stiffdice.sweep.grid import Column, Piece, Sweep
-from stiffdice.sweep.shard import differing, shard_pattern
+from stiffdice.sweep.shard import Known, differing, shard_pattern
 
 Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], steps
 
@@ -66,13 +67,12 @@ class Kept:
     def __len__(self) -> int:
         return len(self._places)
 
-    def has(self, column: Column, steps: int) -> bool:
-        """Return whether a cell is there."""
-        return _cell(column, steps) in self._places
+    def __call__(self, column: Column, steps: int) -> Known | None:
+        """Return what gives some members of a cell, None if the cell is not there."""
+        place = self._places.get(_cell(column, steps))
+        return None if place is None else partial(self._runs, *place)
 
-    def runs(self, column: Column, steps: int, members: slice) -> dict[str, npt.NDArray[Any]]:
-        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
-        path, number = self._places[_cell(column, steps)]
+    def _runs(self, path: Path, number: int, members: slice) -> dict[str, npt.NDArray[Any]]:
         if self._of != (path, members) or number not in self._held:
             # Those after it are asked for next.
             at_once = max(1, reader.RUNS_AT_ONCE // (members.stop - members.start))
@@ -88,8 +88,9 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
 
     It saves opening all shards in every job, and decides no more than that; stiffness has six digits in it.
     """
-    stiffness, steps = [part.column.stiffness for part in pieces], [count for part in pieces for count in part.steps]
-    spans = {"stiffness_{}_kg_s-2": stiffness, "steps_{}": steps} if steps else {}
+    grounds = [part.column.stiffness for part in pieces]
+    steps = [float(count) for part in pieces for count in part.steps]
+    spans = {"stiffness_{}_kg_s-2": grounds, "steps_{}": steps} if steps else {}
     wanted = {name: (min(places), max(places)) for name, places in spans.items()}
     try:
         return {

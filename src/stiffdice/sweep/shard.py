@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
@@ -23,8 +24,8 @@ from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import simulate
 from stiffdice.sweep.grid import Column, Piece, Sweep
 
-if TYPE_CHECKING:
-    from stiffdice.sweep.reuse import Kept
+# What gives some members of a cell by name, shape (member, ...).
+Known = Callable[[slice], Mapping[str, npt.NDArray[Any]]]
 
 # What a shard keeps of each run besides the measures.
 _OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
@@ -41,7 +42,7 @@ def compute_shard(
     pieces: Sequence[Piece],
     path: str | Path,
     progress: Callable[[float], None] | None = None,
-    kept: Kept | None = None,
+    kept: Callable[[Column, int], Known | None] | None = None,
 ) -> int:
     """Compute one shard, store it (each run's measures and verdict, dimensions cell and member), and return its cells.
 
@@ -59,12 +60,14 @@ def compute_shard(
     return spool.cells
 
 
-def _compute_piece(sweep: Sweep, piece: Piece, spool: Spool, kept: Kept | None) -> Iterator[float]:
+def _compute_piece(
+    sweep: Sweep, piece: Piece, spool: Spool, kept: Callable[[Column, int], Known | None] | None
+) -> Iterator[float]:
     """Store all members at each number of steps, computed where they are not kept; yield the fraction that is done."""
     scene, scan = sweep.scene_of(piece.column), piece.steps
     first = spool.add_cells(len(scan))
     spool.put(_cell_values(sweep, piece.column, scan), slice(first, first + len(scan)))
-    there = [kept is not None and kept.has(piece.column, steps) for steps in scan]
+    there = [kept(piece.column, steps) if kept else None for steps in scan]
     launches = turned(scene, sweep.model, sweep.members)
     how: dict[str, Any] = {"simulator": sweep.simulator, "scheme": sweep.scheme, "hop_height": sweep.hop_height}
     asked: dict[str, Any] = {"criteria": sweep.criteria, "stop": sweep.criteria if sweep.early_stop else None}
@@ -76,8 +79,8 @@ def _compute_piece(sweep: Sweep, piece: Piece, spool: Spool, kept: Kept | None) 
         for batch in range(0, len(scan), CHUNK_CELLS):
             runs = []
             for steps, known in zip(scan[batch : batch + CHUNK_CELLS], there[batch:], strict=False):
-                if known and kept is not None:
-                    runs.append(kept.runs(piece.column, steps, block))
+                if known:
+                    runs.append(known(block))
                     continue
                 members = phased(scene, sweep.model, steps, sweep.members, launches, block)
                 run = simulate(scene, model=sweep.model, steps=steps, members=members, **how, **asked)
