@@ -58,9 +58,6 @@ class Kept:
                         self._places.setdefault(cell, (path, number))
             except InputError as error:
                 say(f"not used: {error}")
-        self._of_shard: dict[Path, list[int]] = {}
-        for path, number in self._places.values():
-            self._of_shard.setdefault(path, []).append(number)
         self._held: dict[int, dict[str, npt.NDArray[Any]]] = {}
         self._of: tuple[Path, slice] | None = None
 
@@ -76,7 +73,7 @@ class Kept:
         if self._of != (path, members) or number not in self._held:
             # Those after it are asked for next.
             at_once = max(1, reader.RUNS_AT_ONCE // (members.stop - members.start))
-            numbers = sorted(k for k in self._of_shard[path] if 0 <= k - number < at_once)
+            numbers = sorted(k for of, k in self._places.values() if of == path and 0 <= k - number < at_once)
             runs = reader.some(path, numbers, members)
             self._of = path, members
             self._held = {k: {name: values[row] for name, values in runs.items()} for row, k in enumerate(numbers)}
