@@ -31,10 +31,7 @@ def checked(say: Say) -> Iterator[xr.Dataset]:
     """Read one shard after another, part by part, and note what is in it; one that is not as planned is refused."""
     plan, inputs = partition.of(asked), Inputs(say)
     surveys = opened(((Path(path).stem, path) for path in snakemake.input.surveys), say)
-    later = {
-        int(number) + 1: partition.later(asked, survey, int(number) + 1, len(partition.rounds(plan, int(number) + 1)))
-        for number, survey in surveys.items()
-    }
+    later = {int(number) + 1: partition.later(asked, part, int(number) + 1) for number, part in surveys.items()}
     for path in snakemake.input.shards:
         shard = plan[Path(path).stem]
         pieces = later[shard.round][shard.part] if shard.round else shard.pieces
