@@ -117,7 +117,6 @@ def _names(standings: Sequence[Standing]) -> str:
 
 
 def _disk(use: Use) -> list[str]:
-    """Return what a study takes on disk, and what lies there that no result is."""
     lines = [_row("disk", ": ".join(filter(None, [_bytes(use.total), ", ".join(_sizes(use.kinds))])))]
     if use.stale:
         lines.append(_row("stale", f"shards of other grids: {len(use.stale)}, {_bytes(sum(use.stale.values()))}"))
@@ -130,7 +129,6 @@ def _sizes(sizes: Mapping[str, int]) -> list[str]:
 
 
 def _bytes(size: int) -> str:
-    """Return a size in decimal units."""
     for unit, least in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if size >= least:
             return f"{size / least:.3g} {unit}"
