@@ -16,11 +16,19 @@ GATED = {"contact": "gated", "friction": 0}
 HALF = 1.0352761804100830 / 2  # of the side
 
 
+def sight_of(scene, state, h, late=0.0, lag=0.5):
+    """Of a run that stands at its launch, shape (1,)."""
+    sight = np.zeros(1, SIGHT)
+    sight["step_size"], sight["late"], sight["lag"] = h, late, lag
+    monitor.start(sight[0], physics_of(scene), state)
+    return sight
+
+
 def watched(scene, steps, model="sliding"):
     """What the tracker holds after each step, shape (steps + 1,), and the lowest node's height then [m]."""
     states = simulate(scene, model=model, steps=steps, every=1).trajectory.state
-    physics, sight, seen = physics_of(scene), np.zeros(1, SIGHT), np.zeros(steps + 1, SIGHT)
-    monitor.start(sight[0], physics, states[0], scene.duration / steps, 0.0, 0.5, 0.0)
+    physics, seen = physics_of(scene), np.zeros(steps + 1, SIGHT)
+    sight = sight_of(scene, states[0], scene.duration / steps)
     seen[0] = sight[0]
     for k in range(1, steps + 1):
         monitor.observe(sight[0], physics, states[k], k, 0)
@@ -128,8 +136,7 @@ def test_a_lift_off_between_coarse_steps_is_the_parabolas(offset):
     )
     physics = physics_of(scene)
     state = simulate(scene, model="sliding", steps=1, every=1).trajectory.state[:1].copy()
-    sight = np.zeros(1, SIGHT)
-    monitor.start(sight[0], physics, state[0], h, 0.0, 0.5, 0.0)
+    sight = sight_of(scene, state[0], h)
     t = np.sqrt(2 * top / g)  # of the way up
     for k in range(3):
         late = (k + offset) * h + 1e-9  # since lift-off
@@ -141,8 +148,7 @@ def test_a_lift_off_between_coarse_steps_is_the_parabolas(offset):
 
 def test_time_is_counted_from_the_scenes_launch():
     physics, state = physics_of(Scene()), simulate(Scene(), model="sliding", steps=1, every=1).trajectory.state
-    sight = np.zeros(1, SIGHT)
-    monitor.start(sight[0], physics, state[0], 0.25, 0.1, 0.5, 0.0)
+    sight = sight_of(Scene(), state[0], 0.25, 0.1)
     assert sight["time"][0] == 0.1
     monitor.observe(sight[0], physics, state[1], 7, 5)
     assert sight["time"][0] == 0.1 + 7 * 0.25
@@ -171,9 +177,8 @@ def test_a_swing_within_the_ground_is_no_flight():
 )
 def test_sag_and_pull_follow_the_normal(keys, sag, pull):
     scene = from_mapping(keys)
-    sight = np.zeros(1, SIGHT)
     state = simulate(scene, model="sliding", steps=1, every=1).trajectory.state
-    monitor.start(sight[0], physics_of(scene), state[0], 0.1, 0.0, 0.5, 0.0)
+    sight = sight_of(scene, state[0], 0.1)
     assert sight["sag"][0] == pytest.approx(sag, rel=1e-14)
     assert sight["pull"][0] == pytest.approx(pull, rel=1e-14)
     assert monitor.settled(sight[0]) == pytest.approx(10 * pull * sag, rel=1e-14)

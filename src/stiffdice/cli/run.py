@@ -108,7 +108,7 @@ def _run(options: argparse.Namespace) -> None:
     )
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
-    for line in run_page.doubts(scene, setup.model, setup.own_scheme or "", steps):
+    for line in run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps):
         print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
     with progress() as show:
         run = simulate(

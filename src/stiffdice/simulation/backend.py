@@ -42,24 +42,19 @@ class Setup(NamedTuple):
         return self.scene.duration / self.steps
 
     @property
-    def own_scheme(self) -> str | None:
-        """The scheme if it is one of `schemes.SCHEMES`; None for an engine's."""
-        return self.scheme if self.simulator == OURS else None
-
-    @property
-    def version(self) -> str:
-        """The name and version of what makes the run."""
-        return version_of(self.simulator)
+    def ours(self) -> bool:
+        """Whether the scheme is one of `schemes.SCHEMES`, no engine's."""
+        return self.simulator == OURS
 
     @property
     def lag(self) -> float:
         """By how many steps the velocity is behind the place, as `schemes.LAGS`."""
-        return schemes.LAGS[self.scheme] if self.simulator == OURS else float(_adapter_of(self.simulator).LAG)
+        return schemes.LAGS[self.scheme] if self.ours else float(_adapter_of(self.simulator).LAG)
 
     @property
     def budget(self) -> int:
         """The most work of a run, unless told otherwise: steps, or force evaluations of what takes its own steps."""
-        if self.simulator == OURS:
+        if self.ours:
             return schemes.budget_of(self.scheme, self.steps)
         return schemes.BUDGET if driver().ENGINES[self.simulator].own_steps else self.steps
 

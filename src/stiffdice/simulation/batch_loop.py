@@ -25,11 +25,10 @@ from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
 from stiffdice.integrators import batched_kernel
 from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.batched_kernel import Alone, Body, Numbers, Vector, dot, inlined, row_of
-from stiffdice.simulation import fast_forward, monitor
-from stiffdice.simulation.criteria.registry import CRITERIA, open_of
-from stiffdice.simulation.criteria.registry import observe as criteria_observe
+from stiffdice.simulation import fast_forward
+from stiffdice.simulation.criteria.registry import CRITERIA, observe, open_of
 from stiffdice.simulation.reference import distance
-from stiffdice.simulation.task import Task
+from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, until_kept
 
 SCHEME = "symplectic_euler"
 
@@ -70,25 +69,15 @@ class Balance(NamedTuple):
     sag: float
 
 
-class Limits(NamedTuple):
-    """steps: of the whole run. budget: most to compute of a member. every: keep every K-th state; 0 keeps none."""
-
-    steps: int
-    budget: int
-    every: int
-
-
 class Common(NamedTuple):
-    """What is the same of all members; the first five are tags."""
+    """What is the same of all members; scheme, width and posture are tags."""
 
     scheme: Any
     width: Any
-    model: Any
     posture: Any
-    law: Any
+    system: System
     k: Numbers
     e: Balance
-    physics: Physics
     limits: Limits
 
 
@@ -118,7 +107,7 @@ def _run_on(common: Common, block: Array) -> int:
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
-        new = batched_kernel.step(common.model, common.posture, common.law, common.k, body)
+        new = batched_kernel.step(common.system.model, common.posture, common.system.law, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         energy = _energy(e, new)
         up = now > 0.0
@@ -149,187 +138,136 @@ def _run_on(common: Common, block: Array) -> int:
 
 
 @njit
-def _show(common: Common, state: Any, seen: Any, remembered: Any, reference: Any, step: int, flown: int) -> bool:
-    """Show a step to all who watch; return whether every number is in range."""
-    monitor.observe(seen, common.physics, state, step, flown)
-    criteria_observe(remembered, step, seen, common.model, common.law, common.physics, state, reference)
-    return remembered.finite[0] == 0.0
+def _show(common: Common, member: Member, samples: States, step: int, flown: int) -> bool:
+    """Show a step to all who watch, and keep it; return whether every number is in range."""
+    observe(common.system, member, step, flown)
+    if member.memory.finite[0] > 0.0:
+        return False
+    keep(common.limits, samples, member.state, step)
+    return True
 
 
 @njit
-def _until_kept(common: Common, done: int) -> int:
-    """Return the next step whose state is kept, or the last."""
-    steps, _, every = common.limits
-    return min(steps, (done // every + 1) * every) if every > 0 else steps
-
-
-@njit
-def _keep(common: Common, samples: States, state: Any, done: int) -> None:
-    every = common.limits.every
-    if every > 0 and done % every == 0:
-        samples[done // every] = state
-
-
-@njit
-def _only_compared(
-    common: Common,
-    axes: Array,
-    block: Array,
-    lane: int,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    reference: Any,
-    done: int,
-) -> bool:
+def _only_compared(common: Common, axes: Array, block: Array, lane: int, member: Member, done: int) -> bool:
     """Compare the step that a member has just taken in a lane; return whether that is all there is to see in it."""
+    state, sight, memory, reference = member
     taken = block[DONE, lane]
-    time = seen.late + (done + int(taken)) * seen.step_size
+    time = sight.late + (done + int(taken)) * sight.step_size
     if block[SEEN, lane] > 0.0 or taken >= block[MOST, lane] or not time < reference.horizon:
         return False
     state.position[0], state.position[1], state.position[2] = batched_kernel.place_of(axes, block, lane)
-    off = distance(reference, time, state) / common.physics.radius
-    if off > remembered.limits[_TRAJECTORY] and remembered.decided[_TRAJECTORY] == 0:
+    off = distance(reference, time, state) / common.system.physics.radius
+    if off > memory.limits[_TRAJECTORY] and memory.decided[_TRAJECTORY] == 0:
         return False
-    remembered.trajectory[0] = max(remembered.trajectory[0], off)
+    memory.trajectory[0] = max(memory.trajectory[0], off)
     block[DUE, lane] = taken
     return True
 
 
 @njit
-def _come_out(
-    common: Common,
-    axes: Array,
-    block: Array,
-    lane: int,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    reference: Any,
-    samples: States,
-    done: int,
-) -> int:
-    """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
-    batched_kernel.leave(common.model, axes, block, lane, state)
-    seen.speed, seen.height, seen.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
-    seen.speed_before = block[EARLIER, lane]
-    ratio = 1.0 + (block[WORST, lane] - remembered.energy[1]) / remembered.energy[2]
-    remembered.energy[0] = max(remembered.energy[0], ratio)
-    step = done + int(block[DONE, lane])
-    every_counts = reference.horizon >= seen.time or (remembered.energy[3] > 0.0 and seen.still == 0.0)
-    if block[STILL, lane] > 0.0 and seen.flight == 0.0 and not every_counts:
-        step = _until_kept(common, done)  # the others would not change anything, either
-    if not _show(common, state, seen, remembered, reference, step, 0):
-        return step - 1
-    _keep(common, samples, state, step)
-    return step
+def _lies(sight: Any, memory: Any) -> bool:
+    """Return whether the cube has never left the ground, and goes on moving."""
+    return memory.energy[3] > 0.0 and sight.still == 0.0
 
 
 @njit
-def _fast_forward(
-    common: Common, state: Any, seen: Any, remembered: Any, reference: Any, samples: States, done: int, left: int
-) -> tuple[int, int, bool]:
+def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Member, samples: States, done: int) -> int:
+    """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
+    state, sight, memory, _ = member
+    batched_kernel.leave(common.system.model, axes, block, lane, state)
+    sight.speed, sight.height, sight.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
+    sight.speed_before = block[EARLIER, lane]
+    ratio = 1.0 + (block[WORST, lane] - memory.energy[1]) / memory.energy[2]
+    memory.energy[0] = max(memory.energy[0], ratio)
+    step = done + int(block[DONE, lane])
+    every_counts = member.reference.horizon >= sight.time or _lies(sight, memory)
+    if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not every_counts:
+        step = until_kept(common.limits, done)  # the others would not change anything, either
+    return step if _show(common, member, samples, step, 0) else step - 1
+
+
+@njit
+def _fast_forward(common: Common, member: Member, samples: States, done: int, left: int) -> tuple[int, int, bool]:
     """Take at once what can be; return the steps done, those to take in a lane, 0 at the end, and if any were taken."""
-    model, law, physics, moved = common.model, common.law, common.physics, False
-    while done < common.limits.steps and open_of(remembered) > 0 and remembered.finite[0] == 0.0:
-        most = _until_kept(common, done) - done
-        if reference.horizon >= seen.time:  # at least as often as the reference is known
-            most = min(most, 1 + int(reference.spacing / seen.step_size))
-        flown = fast_forward.free_steps(model, law, physics, state, seen, most)
+    scheme, system, limits, moved = common.scheme, common.system, common.limits, False
+    sight, memory = member.sight, member.memory
+    while done < limits.steps and open_of(memory) > 0 and memory.finite[0] == 0.0:
+        most = fast_forward.compared(member, until_kept(limits, done) - done)
+        flown = fast_forward.fly(scheme, system, member, most)
         if flown > 0:
-            schemes.flight(common.scheme, model, physics, state, seen.step_size, flown)
             moved = True
-            if _show(common, state, seen, remembered, reference, done + flown, flown):
+            if _show(common, member, samples, done + flown, flown):
                 done += flown
-                _keep(common, samples, state, done)
             continue
         if left <= 0:
             break
-        held = seen.held
-        skipped = fast_forward.skip(common.scheme, model, law, physics, state, seen, most)
-        most = min(_until_kept(common, done) - done - skipped, left)
+        held = sight.held
+        skipped = fast_forward.skip(scheme, system, member, most)
+        most = min(until_kept(limits, done) - done - skipped, left)
         # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
         # without ever having left it.
-        if (
-            seen.flight == 1.0
-            or (remembered.energy[3] > 0.0 and seen.still == 0.0)
-            or seen.held > held
-            or fast_forward.follows(common.scheme, model, physics, state, seen)
-        ):
+        known = sight.held > held or fast_forward.follows(scheme, system, member)
+        if known or sight.flight == 1.0 or _lies(sight, memory):
             most = 1
-        elif seen.flight > 0.0 and fast_forward.may_fly(law, model, seen):
+        elif sight.flight > 0.0 and fast_forward.undisturbed(system, sight) > 0.0:
             most = min(most, LONGEST)
         return done + skipped, min(most, _UNSEEN), moved or skipped > 0
     return done, 0, moved
 
 
 @njit
-def _wait(common: Common, block: Array, lane: int, seen: Any, remembered: Any, reference: Any, most: int) -> None:
+def _wait(common: Common, block: Array, lane: int, member: Member, most: int) -> None:
     """Let a member go on in a lane for so many steps, or until something happens."""
-    block[REST, lane] = fast_forward.rest_of(common.model, common.law, common.physics, seen) if most > 1 else -1.0
+    sight, memory = member.sight, member.memory
+    block[REST, lane] = fast_forward.rest_of(common.system, sight) if most > 1 else -1.0
     block[LIMIT, lane] = math.inf
-    if remembered.decided[_ENERGY] == 0 and remembered.limits[_ENERGY] < math.inf:
-        above = (remembered.limits[_ENERGY] - 1.0) * remembered.energy[2]
-        block[LIMIT, lane] = remembered.energy[1] + above
+    if memory.decided[_ENERGY] == 0 and memory.limits[_ENERGY] < math.inf:
+        block[LIMIT, lane] = memory.energy[1] + (memory.limits[_ENERGY] - 1.0) * memory.energy[2]
     block[DONE, lane], block[MOST, lane], block[WORST, lane] = 0.0, most, -math.inf
-    block[DUE, lane] = 0.0 if reference.horizon >= seen.time else most - 1.0
-    block[CLEARANCE, lane], block[SPEED, lane] = seen.clearance, seen.speed_before
+    block[DUE, lane] = 0.0 if member.reference.horizon >= sight.time else most - 1.0
+    block[CLEARANCE, lane], block[SPEED, lane] = sight.clearance, sight.speed_before
 
 
 @njit(cache=True, nogil=True)
 def _march(
-    common: Common,
-    axes: Array,
-    ensemble: States,
-    memory: npt.NDArray[np.void],
-    sight: npt.NDArray[np.void],
-    steps_done: npt.NDArray[np.int64],
-    steps_computed: npt.NDArray[np.int64],
-    references: npt.NDArray[np.void],
-    samples: States,
-    block: Array,
-    inside: npt.NDArray[np.int64],
-    waiting: int,
+    common: Common, axes: Array, members: Members, block: Array, inside: npt.NDArray[np.int64], waiting: int
 ) -> int:
     """Advance members in lanes; return the first that waits for one, at least 1, or −1 if all are at their end.
 
     It returns after _WORK, so that Python can see a signal; where it does changes nothing. inside: the member in each
     lane, −1 for none. waiting: what it returned last; 0 to begin with.
     """
-    work, happening = 0, -1 if waiting == 0 else 0
+    ensemble, sight, memory, references, samples, steps_done, steps_computed, _ = members
+    work, happening, budget = 0, -1 if waiting == 0 else 0, common.limits.budget
     while True:
         for lane in range(block.shape[1]):
             if not happening >> lane & 1:
                 continue
             m, most, moved = inside[lane], 0, False
             if m >= 0:
-                if models.turns(common.model):
+                if models.turns(common.system.model):
                     batched_kernel.turn(block, lane, common.k.h)
-                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
+                member = Member(ensemble[m], sight[m], memory[m], references[m % len(references)])
                 work += _EVENT
-                if _only_compared(common, axes, block, lane, state, seen, remembered, reference, steps_done[m]):
+                if _only_compared(common, axes, block, lane, member, steps_done[m]):
                     continue
                 taken = int(block[DONE, lane])
                 steps_computed[m] += taken
                 work += taken
-                done = _come_out(common, axes, block, lane, state, seen, remembered, reference, samples, steps_done[m])
-                left = common.limits.budget - steps_computed[m]
-                steps_done[m], most, moved = _fast_forward(
-                    common, state, seen, remembered, reference, samples, done, left
-                )
+                done = _come_out(common, axes, block, lane, member, samples, steps_done[m])
+                left = budget - steps_computed[m]
+                steps_done[m], most, moved = _fast_forward(common, member, samples, done, left)
             while most == 0 and waiting < len(ensemble):
                 m, moved = waiting, True
                 waiting += 1
-                state, seen, remembered, reference = ensemble[m], sight[m], memory[m], references[m % len(references)]
-                steps_done[m], most, _ = _fast_forward(
-                    common, state, seen, remembered, reference, samples, steps_done[m], common.limits.budget
-                )
+                member = Member(ensemble[m], sight[m], memory[m], references[m % len(references)])
+                steps_done[m], most, _ = _fast_forward(common, member, samples, steps_done[m], budget)
             inside[lane] = m if most > 0 else -1
             block[LIVE, lane] = 1.0 if most > 0 else 0.0
             if most > 0:
                 if moved:
                     batched_kernel.enter(axes, ensemble[m], block, lane)
-                _wait(common, block, lane, sight[m], memory[m], references[m % len(references)], most)
+                _wait(common, block, lane, member, most)
         if inside.max() < 0:
             return -1
         if work > _WORK:
@@ -343,27 +281,25 @@ def start(task: Task) -> Callable[[], bool] | None:
     None for another scheme, a model in which the ground does not act, and where numbers leave the range of doubles
     before the first step.
     """
-    setup, physics, watched = task.setup, task.physics, task.watched
+    setup, system, members = task.setup, task.system, task.members
     scene, model = setup.scene, setup.model
     if setup.scheme != SCHEME or model not in TOUCHING:
         return None
     axes, h = batched_kernel.axes_of(scene), setup.step_size
-    k, e = batched_kernel.numbers_of(physics, axes, h), _balance(physics, axes, h, watched.sight)
+    k, e = batched_kernel.numbers_of(system.physics, axes, h), _balance(system.physics, axes, h, members.sight)
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
-    width = Alone() if len(task.ensemble) < FEWEST else batched_kernel.ABREAST[model]
-    posture = batched_kernel.posture_of(scene, model, task.ensemble)
-    limits = Limits(setup.steps, task.budget, task.every)
-    common = Common(schemes.SCHEMES[SCHEME], width, task.tags[0], posture, task.tags[1], k, e, physics, limits)
+    width = Alone() if len(members.ensemble) < FEWEST else batched_kernel.ABREAST[model]
+    posture = batched_kernel.posture_of(scene, model, members.ensemble)
+    common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, e, task.limits)
     lanes = batched_kernel.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
     waiting = 0
 
     def advance() -> bool:
         nonlocal waiting
-        members = task.ensemble, *watched[:4], task.references, task.samples
-        waiting = _march(common, axes, *members, block, inside, waiting)
-        watched.evaluations[:] = watched.steps_computed
+        waiting = _march(common, axes, members, block, inside, waiting)
+        members.evaluations[:] = members.steps_computed
         return waiting > 0
 
     return advance

@@ -26,7 +26,7 @@ from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
 from stiffdice.simulation.outcome import Verdict
-from stiffdice.simulation.run import Run, Trajectory
+from stiffdice.simulation.run import Run
 
 CONTACT_ATTRIBUTES = schema.attributes_of("shard", "contact", list(LAWS))
 VERDICTS = [verdict.name.lower() for verdict in Verdict]
@@ -110,26 +110,24 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     trajectory = run.trajectory
     if trajectory is None or len(run.verdict) != 1:
         raise InputError("run: has no trajectory of one launch; simulate(..., every=K) keeps one")
-    values: dict[str, Any] = {"step": trajectory.step} | {
-        name: trajectory.state[name] for name in ("position", "velocity")
-    }
+    turns, state = run.model in TURNING, trajectory.state
     energies = "kinetic_energy", "potential_energy", "elastic_energy", "energy_paper", "mechanical_energy"
+    values: dict[str, Any] = {"step": trajectory.step, "position": state["position"], "velocity": state["velocity"]}
     values |= {name: getattr(trajectory, name) for name in energies if getattr(trajectory, name) is not None}
-    if run.model in TURNING:
-        values |= {name: trajectory.state[name] for name in ("angular_momentum", "node_offset")}
-    values |= {
-        part.MEASURE: ((), run.measures[part.MEASURE][0], MEASURE_ATTRIBUTES[part.MEASURE])
-        for part in criteria_of(run.model).values()
-        if not np.isnan(run.measures[part.MEASURE][0])
-    }
+    if turns:
+        values |= {name: state[name] for name in ("angular_momentum", "node_offset")}
+    measures = {part.MEASURE: run.measures[part.MEASURE][0] for part in criteria_of(run.model).values()}
+    values |= {name: ((), value, MEASURE_ATTRIBUTES[name]) for name, value in measures.items() if not np.isnan(value)}
     outcome = "touchdown_phase", "verdict", "ending", "steps_done", "evaluations"
     values |= {name: getattr(run, name)[0] for name in outcome}
     values |= {"time": trajectory.time, "axis": np.arange(3, dtype=np.int8)}
-    if run.model in TURNING:
+    if turns:
         values["node"] = np.arange(1, len(SIGNS) + 1, dtype=np.int8)
+    config = {name: getattr(run, name) for name in ("model", "simulator", "scheme", "steps", "tolerance")}
+    config["every"] = int(trajectory.step[1]) if len(trajectory.step) > 1 else run.steps
     code = "stiffdice.simulation.run", *backend.code_of(run.simulator)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, *code)
-    attributes |= config_attributes("run", _config(run, trajectory))
+    attributes |= config_attributes("run", config)
     attributes |= simulator_attributes(run.simulator, run.simulator_version) | {
         "model_reason": run.model_reason,
         "steps": run.steps,
@@ -145,15 +143,3 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     if run.scene.derived:
         attributes["scene_derived"] = "; ".join(run.scene.derived)
     return schema.dataset("run", values, {"axis": AXES, "verdict": VERDICTS, "ending": VERDICTS}, attributes)
-
-
-def _config(run: Run, trajectory: Trajectory) -> dict[str, Any]:
-    kept = trajectory.step[:2].tolist()
-    return {
-        "model": run.model,
-        "simulator": run.simulator,
-        "scheme": run.scheme,
-        "steps": run.steps,
-        "tolerance": run.tolerance,
-        "every": kept[1] - kept[0] if len(kept) == 2 else run.steps,
-    }

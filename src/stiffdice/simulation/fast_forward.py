@@ -13,13 +13,14 @@ in the air until the end, or a step changed neither its height nor its speed by 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags, height_of, lowest_of, reaches, speed_of, swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.integrators import registry as schemes
+from stiffdice.simulation.task import Member, System
 
 # Fewer than this are stepped: looking ahead costs about as much.
 WORTHWHILE = 8
@@ -36,22 +37,16 @@ def lost(sight: Any) -> bool:
 
 
 @njit
-def _undisturbed(model: Any, law: Any, speed: float, sight: Any) -> float:
-    """Return for how many steps a body in the air at this speed along the normal [m/s] feels nothing.
+def undisturbed(system: System, sight: Any) -> float:
+    """Return for how many steps a body in the air feels nothing.
 
     Under a law that drags on falling nodes that is as long as all rise, which is known only where none turns.
     """
-    if not (drags(law) and models.touches(model)):
+    if not (drags(system.law) and models.touches(system.model)):
         return math.inf
-    if models.turns(model) or speed < 0.0:
+    if models.turns(system.model) or sight.speed < 0.0:
         return 0.0
-    return speed / (sight.step_size * sight.pull) if sight.pull > 0.0 else math.inf
-
-
-@njit
-def may_fly(law: Any, model: Any, sight: Any) -> bool:
-    """Return whether a body in the air feels nothing for a while."""
-    return _undisturbed(model, law, sight.speed, sight) > 0.0
+    return float(sight.speed / (sight.step_size * sight.pull)) if sight.pull > 0.0 else math.inf
 
 
 @njit
@@ -66,24 +61,36 @@ def _until(room: Any, speed: Any, pull: Any, h: Any) -> Any:
 
 
 @njit
-def free_steps(model: Any, law: Any, physics: Physics, state: Any, sight: Any, most: int) -> int:
-    """Return a number of steps, at most `most`, in which no node touches the ground and no force but weight acts.
+def compared(member: Member, most: int) -> int:
+    """Return how many of `most` steps may go by unseen: a reference is looked at as often as it is known."""
+    sight, reference = member.sight, member.reference
+    return min(most, 1 + int(reference.spacing / sight.step_size)) if reference.horizon >= sight.time else most
 
-    It need not be the greatest. Along the ground's normal the path is a parabola, open downwards, so that over any
-    number of steps it is lowest at an end.
+
+@njit
+def fly(scheme: Any, system: System, member: Member, most: int) -> int:
+    """Take at once steps, at most `most`, in which no node touches the ground and no force but weight acts.
+
+    Return how many; it need not be all. Along the ground's normal the path is a parabola, open downwards, so that over
+    any number of steps it is lowest at an end.
     """
+    state, sight = member.state, member.sight
     if sight.flight < 2.0 or most < WORTHWHILE or lost(sight):
         return 0
-    h = sight.step_size
+    h, model, physics = sight.step_size, system.model, system.physics
     # A scheme's path may be off the parabola by a step's move or two.
     margin = 4 * h * (abs(sight.speed) + h * abs(sight.pull))
     room = sight.height - models.extent(model, physics, state) - margin
     steps = _until(room, sight.speed - h * sight.pull, sight.pull, h) if room > 0.0 else 0.0
-    undisturbed = _undisturbed(model, law, sight.speed, sight)
-    steps = min(steps, undisturbed)
-    if models.turns(model) and steps < most and undisturbed > steps:
+    unforced = undisturbed(system, sight)
+    steps = min(steps, unforced)
+    if models.turns(model) and steps < most and unforced > steps:
         steps = max(steps, _turning(physics, state, sight, margin))
-    return 0 if steps < WORTHWHILE else int(min(steps, float(most)))
+    if steps < WORTHWHILE:
+        return 0
+    flown = int(min(steps, float(most)))
+    schemes.flight(scheme, model, physics, state, h, flown)
+    return flown
 
 
 @njit
@@ -111,15 +118,6 @@ def _turning(physics: Physics, state: Any, sight: Any, margin: float) -> float:
         speed = sight.speed - h * pull + (ax * rx + ay * ry + az * rz)
         soonest = min(soonest, _until(room, speed, pull, h))
     return soonest
-
-
-class Phase(NamedTuple):
-    """The acceleration constant − square·c − rate·u, in m, s, and for how long [s] it is certain."""
-
-    square: float
-    rate: float
-    constant: float
-    lasts: float
 
 
 @njit
@@ -151,8 +149,12 @@ def _until_zero(value: Any, by_place: float, by_speed: float, speed: float, chan
 
 
 @njit
-def phase_of(law: Any, physics: Physics, sight: Any, most: float) -> Phase:
-    """Return the phase that a flat cube is in, certain for at most `most` [s]; it lasts 0 where it changes now."""
+def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, float, float]:
+    """Return square, rate and constant [m, s] of the phase that a flat cube is in, and for how long [s] it is certain.
+
+    That is for at most `most` [s]; 0 where it changes now.
+    """
+    law, physics = system.law, system.physics
     stiffness, damping = physics.stiffness, physics.damping
     c, u = sight.clearance, sight.speed
     square, rate, constant = 0.0, 0.0, -sight.pull
@@ -175,11 +177,11 @@ def phase_of(law: Any, physics: Physics, sight: Any, most: float) -> Phase:
             lasts = min(lasts, _until_zero(push, stiffness, damping, u, changes, sight.step_size))
         elif damping > 0.0 and reaches(law, clearance):
             lasts = min(lasts, _until_zero(u, 0.0, 1.0, u, changes, sight.step_size))
-    return Phase(square, rate, constant, lasts)
+    return square, rate, constant, lasts
 
 
 @njit
-def resting_swing(law: Any, physics: Physics, sight: Any) -> float:
+def resting_swing(system: System, sight: Any) -> float:
     """Return below which √Q [m/s] a flat cube never leaves the ground, but for round-off; negative where not known.
 
     With y the height above that of rest and ω² = 4S/m, Q = u² + ω²y² − h ω² u y is what symplectic Euler keeps of an
@@ -187,8 +189,9 @@ def resting_swing(law: Any, physics: Physics, sight: Any) -> float:
     to Q. Damping, and a push that cannot become a pull, act against the speed and so lower it, but in a step that turns
     the cube around: by less than 0.6 rate·h (ωh)² Q there.
     """
+    physics = system.physics
     h, omega = sight.step_size, math.sqrt(4 * physics.stiffness / physics.mass)
-    damped = h * (8.0 if reaches(law, 1.0) else 4.0) * physics.damping / physics.mass
+    damped = h * (8.0 if drags(system.law) else 4.0) * physics.damping / physics.mass
     if omega * h > 0.5 or damped > 1.0 or not 0.0 < 2 * sight.sag < sight.room:
         return -1.0
     grows = math.exp(0.3 * sight.steps * damped * (omega * h) ** 2)
@@ -196,7 +199,7 @@ def resting_swing(law: Any, physics: Physics, sight: Any) -> float:
 
 
 @njit
-def _rests(law: Any, physics: Physics, sight: Any) -> bool:
+def _rests(system: System, sight: Any) -> bool:
     """Return whether a flat cube swings about its rest by less than its sag, so that it never leaves the ground.
 
     Round-off of the height adds at most ω·ulp in a step to √Q.
@@ -204,19 +207,20 @@ def _rests(law: Any, physics: Physics, sight: Any) -> bool:
     # (ω·sag)² is pull·sag; most steps end here.
     if not sight.clearance < 0.0 or sight.speed * sight.speed > 2 * sight.pull * sight.sag:
         return False
-    omega = math.sqrt(4 * physics.stiffness / physics.mass)
+    omega = math.sqrt(4 * system.physics.stiffness / system.physics.mass)
     square = swing_square(omega, sight.step_size, sight.clearance + sight.sag, sight.speed)
     lost = sight.steps * omega * 2.0**-52 * abs(sight.height)
-    return math.sqrt(square) + lost < resting_swing(law, physics, sight)
+    return math.sqrt(square) + lost < resting_swing(system, sight)
 
 
 @njit
-def _hangs(law: Any, physics: Physics, sight: Any) -> bool:
+def _hangs(system: System, sight: Any) -> bool:
     """Return whether a flat cube that sinks through the air as fast as its drag allows ends before it lands."""
-    drag, weight = 8 * physics.damping, physics.mass * sight.pull
-    if sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0 or not reaches(law, 1.0):
+    drag, mass = 8 * system.physics.damping, system.physics.mass
+    weight = mass * sight.pull
+    if sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0 or not drags(system.law):
         return False
-    if drag * sight.step_size > physics.mass:
+    if drag * sight.step_size > mass:
         return False
     left = sight.steps * sight.step_size - (sight.time - sight.late)
     lost = sight.steps * 2.0**-52 * abs(sight.height)
@@ -224,11 +228,11 @@ def _hangs(law: Any, physics: Physics, sight: Any) -> bool:
 
 
 @njit
-def rest_of(model: Any, law: Any, physics: Physics, sight: Any) -> float:
+def rest_of(system: System, sight: Any) -> float:
     """Return below which `swing_square` [m²/s²] a cube may rest, so that `skip` is asked; −1 where it never does."""
-    if models.turns(model) or not sight.room > 0.0 or sight.held > 0.0:
+    if models.turns(system.model) or not sight.room > 0.0 or sight.held > 0.0:
         return -1.0
-    swing = resting_swing(law, physics, sight)
+    swing = resting_swing(system, sight)
     return swing * swing if swing > 0.0 else -1.0
 
 
@@ -239,38 +243,37 @@ def _rubs(physics: Physics, state: Any) -> bool:
 
 
 @njit
-def follows(scheme: Any, model: Any, physics: Physics, state: Any, sight: Any) -> bool:
+def follows(scheme: Any, system: System, member: Member) -> bool:
     """Return whether this is a motion of which `skip` knows the phases, and takes one as soon as it may."""
-    flat = not models.turns(model) and sight.room > 0.0 and physics.nz == 1.0
-    return flat and not _rubs(physics, state) and schemes.proven(scheme)
+    flat = not models.turns(system.model) and member.sight.room > 0.0 and system.physics.nz == 1.0
+    return flat and not _rubs(system.physics, member.state) and schemes.proven(scheme)
 
 
 @njit
-def skip(scheme: Any, model: Any, law: Any, physics: Physics, state: Any, sight: Any, most: int) -> int:
+def skip(scheme: Any, system: System, member: Member, most: int) -> int:
     """Take all steps but one or two, at most `most`, that are sure to stay within the phase, and return how many.
 
     Zero where that is too few to be worth it, and where the motion is not known. The next step is in the phase, too.
     """
-    if models.turns(model) or not sight.room > 0.0:
+    state, sight, physics = member.state, member.sight, system.physics
+    if models.turns(system.model) or not sight.room > 0.0:
         return 0
     rubs = _rubs(physics, state)
     stays = not rubs and sight.still > 0.0
     if schemes.proven(scheme) and not stays:
-        stays = _rests(law, physics, sight) or (not rubs and _hangs(law, physics, sight))
+        stays = _rests(system, sight) or (not rubs and _hangs(system, sight))
     if stays and sight.held == 0.0:
         sight.held = 1.0
         return 0
-    followed = follows(scheme, model, physics, state, sight)
-    if not followed or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
+    if not follows(scheme, system, member) or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):
         return 0
     h = sight.step_size
     sight.clearance = sight.height - lowest_of(physics, state)  # far from the ground it was a lower bound
-    phase = phase_of(law, physics, sight, most * h)
-    steps = int(min(phase.lasts / h, float(most))) - 2
+    square, rate, constant, lasts = phase_of(system, sight, most * h)
+    steps = int(min(lasts / h, float(most))) - 2
     if steps < WORTHWHILE:
         return 0
-    place, speed = sight.clearance, sight.speed
-    moved, speed = schemes.swing(scheme, place, speed, h, steps, phase.square, phase.rate, phase.constant)
+    moved, speed = schemes.swing(scheme, sight.clearance, sight.speed, h, steps, square, rate, constant)
     if not math.isfinite(moved):
         return 0
     state.position[0] += steps * h * state.velocity[0]

@@ -17,10 +17,10 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import height_of, lowest_of, room_of, speed_of
 from stiffdice.dynamics.state import Physics
 
-# Of one run. Constants: step_size [s], steps (of the whole run, set by who makes it), late [s] (how far along the
-# scene's flight the launch is), lag [steps], pull (gravity towards the ground, along its normal) [m/s²], sag [m] (how
-# deep a cube at rest sinks in, at most its side), room [m] (how much higher than the four lowest nodes the others are
-# at the launch; 0 if those are not level), hop_height [m] (lower rebounds are not judged by `apex`).
+# Of one run. Constants, set by who makes it: step_size [s], steps (of the whole run), late [s] (how far along the
+# scene's flight the launch is), lag [steps], hop_height [m] (lower rebounds are not judged by `apex`); and by `start`:
+# pull (gravity towards the ground, along its normal) [m/s²], sag [m] (how deep a cube at rest sinks in, at most its
+# side), room [m] (how much higher than the four lowest nodes the others are at the launch; 0 if those are not level).
 # Of the last step: time [s] since the scene's launch, clearance of the lowest node [m], speed away from the ground
 # [m/s] and the speed one step before; flight: how many steps in a row have been in the air; lifted: 1 if in this step
 # a flight after a bounce became known; still: 1 if it changed neither height nor speed; held: 1 if no criterion can
@@ -31,7 +31,7 @@ SIGHT = np.dtype(
     [
         (name, np.float64)
         for name in (
-            *("step_size", "steps", "late", "lag", "pull", "sag", "room", "hop_height"),
+            *("step_size", "steps", "late", "lag", "hop_height", "pull", "sag", "room"),
             *("time", "height", "clearance", "speed", "speed_before", "flight", "lifted", "still", "held", "touched"),
             *("speed_in", "speed_out", "bounces", "touchdown_phase", "pending", "work"),
         )
@@ -50,35 +50,22 @@ def clearance_of(physics: Physics, state: Any, height: float, speed: float, h: f
 
 
 @njit
-def start(sight: Any, physics: Physics, state: Any, h: float, late: float, lag: float, hop_height: float) -> None:
-    """Begin to watch a run that stands at its launch."""
-    sight.step_size = h
-    sight.late = late
-    sight.lag = lag
-    sight.hop_height = hop_height
+def start(sight: Any, physics: Physics, state: Any) -> None:
+    """Begin to watch a run that stands at its launch; `sight` is zero but for what who makes it has set."""
     sight.pull = physics.gravity * physics.nz
-    sight.sag = 0.0
     if sight.pull > 0.0:
         hardly = physics.mass * sight.pull < 4 * physics.stiffness * physics.side
         sight.sag = physics.mass * sight.pull / 4 / physics.stiffness if hardly else physics.side
     sight.room = room_of(physics, state)
-    sight.time = late
+    sight.time = sight.late
     sight.height = height_of(physics, state)
     sight.speed = speed_of(physics, state)
-    sight.speed_before = sight.speed + h * sight.pull
+    sight.speed_before = sight.speed + sight.step_size * sight.pull
     sight.clearance = sight.height - lowest_of(physics, state)
     # A launch in the air is amid its flight, not at the start of one.
     sight.flight = 2.0 if sight.clearance > 0.0 else 0.0
     sight.touched = 1.0 if sight.clearance <= 0.0 else 0.0
-    sight.lifted = 0.0
-    sight.still = 0.0
-    sight.held = 0.0
-    sight.speed_in = math.nan
-    sight.speed_out = math.nan
-    sight.bounces = 0.0
-    sight.touchdown_phase = math.nan
-    sight.pending = 0.0
-    sight.work = 0.0
+    sight.speed_in = sight.speed_out = sight.touchdown_phase = math.nan
 
 
 @njit

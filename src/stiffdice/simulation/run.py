@@ -13,22 +13,20 @@ import numpy.typing as npt
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.energy import energies, mechanical
-from stiffdice.dynamics.state import Array, Ensemble, Physics, States, start_of
+from stiffdice.dynamics.state import Array, Ensemble, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import backend, batch_loop, fast_forward, monitor
+from stiffdice.simulation import backend, batch_loop, fast_forward
 from stiffdice.simulation.backend import Setup
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria.apex import default_hop_height
-from stiffdice.simulation.criteria.energy import finish
-from stiffdice.simulation.criteria.registry import MEMORY, limits_of, open_of, tolerances_of, values
-from stiffdice.simulation.criteria.registry import observe as criteria_observe
+from stiffdice.simulation.criteria.registry import MEMORY, finish, limits_of, observe, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import start as criteria_start
 from stiffdice.simulation.monitor import SIGHT
 from stiffdice.simulation.reference import none
-from stiffdice.simulation.task import Task, Watched, room_for
+from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, room_for, until_kept
 
 # Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth
 # of a second.
@@ -167,55 +165,37 @@ def _task(
         raise InputError(f"tolerance = {number:g}: allowed is a number from {schemes.FINEST:g} to {schemes.COARSEST:g}")
     if hop_height is None:
         hop_height = default_hop_height(setup.scene)
+    hop_height = validation.number("hop_height", hop_height, "m", at_least=0)
     launches, late = members or Ensemble(start_of(setup.scene, setup.model), np.zeros(1))
     count = len(launches)
     if every is not None:
         every = validation.count("every", every, at_most=setup.steps)
         if count != 1:
             raise InputError("every: a trajectory is kept of one run, not of an ensemble")
-    task = Task(
-        setup,
-        number,
-        setup.budget if budget is None else budget,
-        every or 0,
-        validation.number("hop_height", hop_height, "m", at_least=0),
-        launches,
-        launches.copy(),
-        Watched(np.zeros(count, MEMORY), np.zeros(count, SIGHT), *np.zeros((3, count), np.int64)),
-        none() if references is None else references,
-        room_for(setup.steps, every),
-    )
-    memory, sight = task.watched[:2]
+    samples, sight, memory = room_for(setup.steps, every), np.zeros(count, SIGHT), np.zeros(count, MEMORY)
+    samples[:1] = launches[:1]
+    sight["step_size"], sight["steps"], sight["late"] = setup.step_size, setup.steps, late
+    sight["lag"], sight["hop_height"] = setup.lag, hop_height
     memory["limits"] = limits_of(stop or {})
-    task.samples[:1] = launches[:1]
-    h, lag = setup.step_size, setup.lag
-    _begin(*task.tags, task.physics, task.ensemble, memory, sight, h, setup.steps, late, lag, task.hop_height)
+    references = none() if references is None else references
+    watched = Members(launches.copy(), sight, memory, references, samples, *np.zeros((3, count), np.int64))
+    limits = Limits(setup.steps, setup.budget if budget is None else budget, every or 0, number)
+    task = Task(setup, limits, hop_height, launches, watched)
+    criteria_start(task.system, watched)
     return task
 
 
 def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:
     """Advance every member to its end; leaping: take motion that is known at once."""
     setup = task.setup
-    if setup.simulator != backend.OURS:
+    if not setup.ours:
         backend.driver().march(task, progress)
         return
 
+    system, scheme = task.system, schemes.SCHEMES[setup.scheme]
+
     def stepwise() -> bool:
-        goes_on: bool = _march(
-            schemes.SCHEMES[setup.scheme],
-            *task.tags,
-            task.physics,
-            task.ensemble,
-            *task.watched,
-            task.references,
-            setup.steps,
-            setup.step_size,
-            task.tolerance,
-            task.budget,
-            task.every,
-            True if leaping else None,
-            task.samples,
-        )
+        goes_on: bool = _march(scheme, system, task.members, task.limits, True if leaping else None)
         return goes_on
 
     advance = (batch_loop.start(task) if leaping else None) or stepwise
@@ -223,171 +203,108 @@ def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None
     while goes_on:  # between two calls of compiled code, Python sees signals
         goes_on = advance()
         if progress is not None:
-            progress(task.watched.fraction(setup.steps, setup.step_size))
+            progress(task.members.fraction(setup.steps, setup.step_size))
 
 
 def _judged(task: Task, tolerances: dict[str, float]) -> Run:
     """Return the run that is over, with its verdicts."""
-    setup, watched = task.setup, task.watched
-    _finish(task.physics, task.ensemble, watched.memory, watched.sight)
-    measures = values(watched.memory)
+    setup, members = task.setup, task.members
+    finish(task.system, members)
+    measures = values(members.memory)
     ended = judge.ending(measures, judge.endings_of(task))
     return Run(
         **setup._asdict(),
-        simulator_version=setup.version,
-        tolerance=task.tolerance,
+        simulator_version=backend.version_of(setup.simulator),
+        tolerance=task.limits.tolerance,
         tolerances=tolerances,
         hop_height=task.hop_height,
         measures=measures,
-        touchdown_phase=watched.sight["touchdown_phase"].copy(),
-        steps_done=watched.steps_done,
-        decided=watched.memory["decided"].copy(),
-        steps_computed=watched.steps_computed,
-        evaluations=watched.evaluations,
+        touchdown_phase=members.sight["touchdown_phase"].copy(),
+        steps_done=members.steps_done,
+        decided=members.memory["decided"].copy(),
+        steps_computed=members.steps_computed,
+        evaluations=members.evaluations,
         ending=ended,
         verdict=judge.judge(tolerances, measures, ended),
-        end=task.ensemble,
-        trajectory=_trajectory(task) if task.every else None,
+        end=members.ensemble,
+        trajectory=_trajectory(task) if task.limits.every else None,
     )
 
 
 def _trajectory(task: Task) -> Trajectory:
-    setup, physics = task.setup, task.physics
-    state = task.samples[: int(task.watched.steps_done[0]) // task.every + 1]
-    step = np.arange(len(state), dtype=np.int64) * task.every
-    whole = None
-    if setup.simulator == backend.OURS:
-        whole = mechanical(*task.tags, physics, state, setup.lag * setup.step_size)
+    setup, system, every = task.setup, task.system, task.limits.every
+    state = task.members.samples[: int(task.members.steps_done[0]) // every + 1]
+    step = np.arange(len(state), dtype=np.int64) * every
+    whole = mechanical(*system, state, setup.lag * setup.step_size) if setup.ours else None
     time = step / setup.steps * setup.scene.duration
-    kinetic, potential, elastic = energies(physics, state)
+    kinetic, potential, elastic = energies(system.physics, state)
     return Trajectory(step, time, state, kinetic, potential, elastic, whole)
 
 
 @njit(cache=True)
-def _begin(
-    model: Any,
-    law: Any,
-    physics: Physics,
-    ensemble: States,
-    memory: npt.NDArray[np.void],
-    sight: npt.NDArray[np.void],
-    h: float,
-    steps: int,
-    late: Array,
-    lag: float,
-    hop_height: float,
-) -> None:
-    """Let everything that watches a run look at its launch."""
-    for m in range(ensemble.shape[0]):
-        monitor.start(sight[m], physics, ensemble[m], h, late[m], lag, hop_height)
-        sight[m].steps = steps
-        criteria_start(memory[m], sight[m], model, law, physics, ensemble[m])
-
-
-@njit(cache=True)
-def _finish(physics: Physics, ensemble: States, memory: npt.NDArray[np.void], sight: npt.NDArray[np.void]) -> None:
-    """Let the energy look at the last state of each run."""
-    for m in range(ensemble.shape[0]):
-        finish(memory[m].energy, sight[m], physics, ensemble[m])
-
-
-@njit(cache=True)
-def _march(
-    scheme: Any,
-    model: Any,
-    law: Any,
-    physics: Physics,
-    ensemble: States,
-    memory: npt.NDArray[np.void],
-    sight: npt.NDArray[np.void],
-    steps_done: npt.NDArray[np.int64],
-    steps_computed: npt.NDArray[np.int64],
-    evaluations: npt.NDArray[np.int64],
-    references: npt.NDArray[np.void],
-    steps: int,
-    h: float,
-    tolerance: float,
-    budget: int,
-    every: int,
-    leap: Any,
-    samples: States,
-) -> bool:
+def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: Any) -> bool:
     """Advance one member after another, watching each step and keeping every K-th; return whether there is more to do.
 
     It ends after _WORK, so that Python can see a signal; where it ends changes nothing. leap: whether motion that is
     known is taken at once, up to the next sample; None if not, which leaves all of that out of what is compiled.
     """
     work = 0.0
-    for m in range(ensemble.shape[0]):
-        state, seen, remembered = ensemble[m], sight[m], memory[m]
-        reference = references[m % references.shape[0]]
-        undecided = open_of(remembered)
-        done = steps_done[m]
-        kept = (done // every + 1) * every if every > 0 else -1  # the step to keep next
-        while done < steps and undecided > 0 and remembered.finite[0] == 0.0:
+    for m in range(len(members.ensemble)):
+        state, sight, memory = members.ensemble[m], members.sight[m], members.memory[m]
+        member = Member(state, sight, memory, members.references[m % len(members.references)])
+        undecided, done = open_of(memory), members.steps_done[m]
+        kept = until_kept(limits, done)  # the step to keep next
+        while done < limits.steps and undecided > 0 and memory.finite[0] == 0.0:
             if work >= _WORK:
-                steps_done[m] = done
+                members.steps_done[m] = done
                 return True
-            before = seen.work
-            left = budget - max(steps_computed[m], int(before))
-            if leap is not None and seen.pending == 0.0:
-                most = min(kept, steps) - done if every > 0 else steps - done
-                taken, flown, computed, evaluated = _leap(
-                    scheme, model, law, physics, state, seen, remembered, reference, most, left, tolerance
-                )
+            before = sight.work
+            left = limits.budget - max(members.steps_computed[m], int(before))
+            if leap is not None and sight.pending == 0.0:
+                taken, flown, computed, evaluated = _leap(scheme, system, member, kept - done, left, limits.tolerance)
             elif left > 0:
-                taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+                taken, evaluated = _one(scheme, system, member, limits.tolerance)
                 flown, computed = 0, taken
             else:
                 break
-            work += 1 + max(evaluated, seen.work - before)
-            steps_computed[m] += computed
-            evaluations[m] += evaluated
-            if seen.pending > 0.0:
+            work += 1 + max(evaluated, sight.work - before)
+            members.steps_computed[m] += computed
+            members.evaluations[m] += evaluated
+            if sight.pending > 0.0:
                 continue
             if taken == 0:
                 break
-            step = done + taken
-            monitor.observe(seen, physics, state, step, flown)
-            undecided -= criteria_observe(remembered, step, seen, model, law, physics, state, reference)
-            if remembered.finite[0] > 0.0:
-                done = step - 1 if computed > 0 else done
+            undecided -= observe(system, member, done + taken, flown)
+            if memory.finite[0] > 0.0:
+                done = done + taken - 1 if computed > 0 else done
                 break
-            done = step
+            done += taken
             if done == kept:
-                samples[step // every] = state
-                kept += every
-        steps_done[m] = done
+                keep(limits, members.samples, state, done)
+                kept = until_kept(limits, done)
+        members.steps_done[m] = done
     return False
 
 
 @njit
+def _one(scheme: Any, system: System, member: Member, tolerance: float) -> tuple[int, int]:
+    """Take a step, or a part of it; return the steps done and force evaluations."""
+    state, sight = member.state, member.sight
+    return schemes.one(scheme, system.model, system.law, system.physics, state, sight, tolerance)
+
+
+@njit
 def _leap(
-    scheme: Any,
-    model: Any,
-    law: Any,
-    physics: Physics,
-    state: Any,
-    seen: Any,
-    remembered: Any,
-    reference: Any,
-    most: int,
-    left: int,
-    tolerance: float,
+    scheme: Any, system: System, member: Member, most: int, left: int, tolerance: float
 ) -> tuple[int, int, int, int]:
     """Take steps up to the next that must be seen; return how many, in free flight, computed, and force evaluations.
 
     most: steps at most. left: those that may be computed; where that is none and no other is known, none is taken.
     """
-    compared = reference.horizon >= seen.time
-    if compared:  # at least as often as the reference is known
-        most = min(most, 1 + int(reference.spacing / seen.step_size))
-    flown = fast_forward.free_steps(model, law, physics, state, seen, most)
-    if flown > 0:
-        schemes.flight(scheme, model, physics, state, seen.step_size, flown)
+    most = fast_forward.compared(member, most)
+    flown = fast_forward.fly(scheme, system, member, most)
+    if flown > 0 or left <= 0:
         return flown, flown, 0, 0
-    if left <= 0:
-        return 0, 0, 0, 0
-    skipped = fast_forward.skip(scheme, model, law, physics, state, seen, most)
-    taken, evaluated = schemes.one(scheme, model, law, physics, state, seen, tolerance)
+    skipped = fast_forward.skip(scheme, system, member, most)
+    taken, evaluated = _one(scheme, system, member, tolerance)
     return skipped + taken, 0, taken, evaluated

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
@@ -17,14 +18,47 @@ from stiffdice.simulation.backend import Setup
 LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
 
-class Watched(NamedTuple):
-    """What a kernel keeps of each member besides its state; first dimension member.
+class System(NamedTuple):
+    """What moves, as compiled functions take it: the tags of the model and of the contact law, the scene's numbers."""
 
-    memory: MEMORY of the criteria. sight: SIGHT of the monitor. The others count steps and force evaluations.
+    model: Any
+    law: Any
+    physics: Physics
+
+
+class Limits(NamedTuple):
+    """steps: of the whole run. budget: steps, or force evaluations of what takes its own, to compute of a member.
+
+    every: a state is kept after each K-th step, none if 0. tolerance [1]: of the error.
     """
 
-    memory: npt.NDArray[np.void]
+    steps: int
+    budget: int
+    every: int
+    tolerance: float
+
+
+class Member(NamedTuple):
+    """A member's records; compiled code makes one of `Members` where it needs it, as returning a record copies it."""
+
+    state: Any
+    sight: Any
+    memory: Any
+    reference: Any
+
+
+class Members(NamedTuple):
+    """What the loops read and change in place; first dimension member but where told.
+
+    ensemble: states now. sight: SIGHT of the monitor. memory: MEMORY of the criteria. references: REFERENCE records,
+    one or one for each member. samples: the states kept of a run, shape (sample,). The others count.
+    """
+
+    ensemble: States
     sight: npt.NDArray[np.void]
+    memory: npt.NDArray[np.void]
+    references: npt.NDArray[np.void]
+    samples: States
     steps_done: npt.NDArray[np.int64]
     steps_computed: npt.NDArray[np.int64]
     evaluations: npt.NDArray[np.int64]
@@ -42,33 +76,19 @@ class Watched(NamedTuple):
 
 
 class Task(NamedTuple):
-    """One run or an ensemble, as the loops take it; they change `ensemble`, `watched` and `samples` in place.
-
-    tolerance [1]: of the error. budget: steps, or force evaluations of what takes its own steps. every: a state is kept
-    after each K-th step, none if 0. hop_height [m]: of the criterion apex. launches, ensemble: states at the launch and
-    now, shape (member,). references: REFERENCE records, one or one for each member. samples: the states kept.
-    """
+    """One run or an ensemble. hop_height [m]: of the criterion apex. launches: states, shape (member,)."""
 
     setup: Setup
-    tolerance: float
-    budget: int
-    every: int
+    limits: Limits
     hop_height: float
     launches: States
-    ensemble: States
-    watched: Watched
-    references: npt.NDArray[np.void]
-    samples: States
+    members: Members
 
     @property
-    def tags(self) -> tuple[Any, Any]:
-        """The model and the contact law, as compiled functions take them."""
-        return MODELS[self.setup.model], LAWS[self.setup.scene.ground.contact]
-
-    @property
-    def physics(self) -> Physics:
-        """The numbers of the scene."""
-        return physics_of(self.setup.scene)
+    def system(self) -> System:
+        """What moves."""
+        scene = self.setup.scene
+        return System(MODELS[self.setup.model], LAWS[scene.ground.contact], physics_of(scene))
 
 
 def room_for(steps: int, every: int | None) -> States:
@@ -80,3 +100,17 @@ def room_for(steps: int, every: int | None) -> States:
             f"allowed is {math.ceil(steps / LARGEST_TRAJECTORY)} or more"
         )
     return np.zeros(count, STATE)
+
+
+@njit
+def until_kept(limits: Limits, done: int) -> int:
+    """Return the next step whose state is kept, or the last."""
+    steps, every = limits.steps, limits.every
+    return min(steps, (done // every + 1) * every) if every > 0 else steps
+
+
+@njit
+def keep(limits: Limits, samples: States, state: Any, done: int) -> None:
+    """Keep a state if it is that of a K-th step."""
+    if limits.every > 0 and done % limits.every == 0:
+        samples[done // limits.every] = state

@@ -65,7 +65,7 @@ def test_flights_taken_at_once_change_no_more_than_round_off(problem):
     scene = scene_of(chosen, BASE, 1e4)
     effort = Effort(12_000, math.nan)
     leaped = path_of(chosen, scene, "symplectic_euler", effort, 10**6)
-    stepped = plain(chosen, scene, "symplectic_euler", effort)()
+    stepped = plain(chosen, scene, "symplectic_euler", effort)()()
     np.testing.assert_allclose(leaped.states["position"], stepped.states["position"], rtol=0, atol=1e-9)
     assert leaped.evaluations == stepped.evaluations == 12_000
     assert leaped.computed < 6_000

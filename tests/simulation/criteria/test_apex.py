@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.dynamics.state import start_of
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.criteria import apex
 from stiffdice.simulation.monitor import SIGHT
@@ -174,12 +174,11 @@ def test_a_one_step_hop_is_no_flight():
 
 def shown(before, speed_out, lifted=1.0):
     """What the criterion says of one flight after another, given its energy before, on stiff ground."""
-    scene = from_mapping({"ground": {"stiffness": 1e12}})
-    physics, state = physics_of(scene), start_of(scene, "sliding")[0]
+    state = start_of(from_mapping({"ground": {"stiffness": 1e12}}), "sliding")[0]
     sight, memory = np.zeros(1, SIGHT), np.zeros(apex.SLOTS)
     memory[1] = before
     sight["speed_out"], sight["lifted"], sight["pull"] = speed_out, lifted, 9.8
-    return apex.observe(memory, sight[0], None, None, physics, state, None), memory
+    return apex.observe(memory, sight[0], None, state, None), memory
 
 
 def test_only_a_lift_off_is_measured_and_becomes_the_one_before():

@@ -12,6 +12,7 @@ from stiffdice.simulation.criteria import energy
 from stiffdice.simulation.monitor import SIGHT
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import simulate
+from stiffdice.simulation.task import System
 
 GATED = {"contact": "gated", "friction": 0}
 
@@ -39,11 +40,12 @@ def test_a_flight_neither_gains_nor_loses(model, steps):
     scene = from_mapping({"ground": GATED, "launch": launch, "duration": 4.0})
     states = simulate(scene, model=model, steps=steps, every=1).trajectory.state
     physics, sight, slots = physics_of(scene), np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
-    tags = MODELS[model], LAWS["gated"]
+    system = System(MODELS[model], LAWS["gated"], physics)
+    sight["step_size"], sight["lag"] = 4.0 / steps, 0.5
     for first, second in ((0, steps), (steps, 0), (steps // 2, 1), (steps // 4, steps // 2)):
-        monitor.start(sight[0], physics, states[first], 4.0 / steps, 0.0, 0.5, 0.0)
-        energy.start(slots, sight[0], *tags, physics, states[first])
-        assert energy.observe(slots, sight[0], *tags, physics, states[second], None)[0] == pytest.approx(1, abs=1e-12)
+        monitor.start(sight[0], physics, states[first])
+        energy.start(slots, sight[0], system, states[first])
+        assert energy.observe(slots, sight[0], system, states[second], None)[0] == pytest.approx(1, abs=1e-12)
 
 
 def airborne_energy(scene, kept, steps):
@@ -79,13 +81,14 @@ def test_it_counts_only_the_air():
     scene = from_mapping({})
     physics, state = physics_of(scene), start_of(scene, "tumbling")
     sight, slots = np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
-    monitor.start(sight[0], physics, state[0], 1e-3, 0.0, 0.5, 0.0)
-    tags = MODELS["tumbling"], LAWS["ungated"]
-    energy.start(slots, sight[0], *tags, physics, state[0])
+    sight["step_size"], sight["lag"] = 1e-3, 0.5
+    monitor.start(sight[0], physics, state[0])
+    system = System(MODELS["tumbling"], LAWS["ungated"], physics)
+    energy.start(slots, sight[0], system, state[0])
     state["velocity"] *= 10
     for flight, expected in ((0, 1), (1, 50)):
         sight["flight"] = flight
-        measure, settled = energy.observe(slots, sight[0], *tags, physics, state[0], None)
+        measure, settled = energy.observe(slots, sight[0], system, state[0], None)
         assert measure == pytest.approx(expected, rel=0.1)
         assert not settled
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.state import STATE, physics_of
-from stiffdice.scene.scene import Scene, from_mapping
+from stiffdice.dynamics.state import STATE
+from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.criteria import finite
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import simulate
@@ -26,7 +26,6 @@ def test_it_is_one_where_a_number_left_the_range_of_doubles(keys, measure, every
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
 def test_no_part_of_a_state_escapes(part, axis, value):
     state, slots = np.zeros(1, STATE), np.zeros(finite.SLOTS)
-    physics = physics_of(Scene())
-    assert finite.observe(slots, None, None, None, physics, state[0], None) == (0.0, False)
+    assert finite.observe(slots, None, None, state[0], None) == (0.0, False)
     state[part][(0, 0, axis) if part == "node_offset" else (0, axis)] = value
-    assert finite.observe(slots, None, None, None, physics, state[0], None)[0] == 1.0
+    assert finite.observe(slots, None, None, state[0], None)[0] == 1.0

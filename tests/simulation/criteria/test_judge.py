@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -144,7 +146,7 @@ def test_a_cube_swings_twice_as_deep_as_it_rests_and_deeper_by_what_it_fell_with
     memory["energy"][:, 2], sight["sag"] = 2 * physics.stiffness * fall**2, sag
     ends = {"position": np.zeros((2, 3)), "node_offset": np.zeros((2, 8, 3))}
     ends["position"][:, 2] = -(2 * sag + fall) * np.array([0.999, 1.001])
-    assert sunk(physics, ends, memory, sight).tolist() == [False, True]
+    assert sunk(physics, SimpleNamespace(ensemble=ends, memory=memory, sight=sight)).tolist() == [False, True]
 
 
 def test_a_step_is_lost_in_the_place_it_goes_from_to_where_it_goes():

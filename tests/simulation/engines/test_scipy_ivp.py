@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from stiffdice.dynamics.code_digest import PACKAGE
-from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.dynamics.state import start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Judge, scene_of
 from stiffdice.scene.scene import Scene, from_mapping
-from stiffdice.simulation.engines import registry as engines
-from stiffdice.simulation.engines import scipy_ivp
+from stiffdice.simulation.engines import scipy_ivp, stepper
 from stiffdice.simulation.engines.registry import PEERS, SOLVERS, Peer
 from stiffdice.simulation.run import simulate
 
@@ -26,7 +25,7 @@ THROW = {
 
 
 def solved(peer, scene, model, tolerance):
-    return engines.prepare(peer, scene, model, SAMPLES, tolerance)()
+    return stepper.ready(peer, scene, model, SAMPLES, SAMPLES, tolerance)()()
 
 
 @pytest.mark.parametrize("peer", SOLVERS)
@@ -69,15 +68,13 @@ def test_the_jacobian_says_how_the_slope_changes():
     """In a contact, along random directions; the force's parts are linear in depth and nearly so in the rest."""
     scene = from_mapping(THROW, "as_written")
     slope, slopes = scipy_ivp.equations("tumbling", "gated")
-    (launch,) = start_of(scene, "tumbling")
-    numbers = np.array([*physics_of(scene), *launch["node_offset"].ravel()])
-    room = np.zeros(1, launch.dtype)
-    y = np.concatenate([[0.0, 0.0, 0.4], [3.0, 1.0, -2.0], [0.9, 0.3, 0.2, 0.1], [0.3, 0.5, 0.2]])
-    jacobian = slopes(0.0, y, numbers, room, np.ones(len(y)))
+    room = scipy_ivp.room_of(scene, start_of(scene, "tumbling"))
+    y = np.concatenate([[0.0, 0.0, 0.4], [3.0, 1.0, -2.0], [0.3, 0.5, 0.2], [0.9, 0.3, 0.2, 0.1]])
+    jacobian = slopes(0.0, y, room, np.ones(len(y)))
     random = np.random.default_rng(1)
     for _ in range(5):
         way = random.standard_normal(len(y)) * 1e-6
-        change = (slope(0.0, y + way, numbers, room) - slope(0.0, y - way, numbers, room)) / 2
+        change = (slope(0.0, y + way, room) - slope(0.0, y - way, room)) / 2
         np.testing.assert_allclose(jacobian @ way, change, rtol=1e-4, atol=1e-4 * np.abs(change).max())
 
 
@@ -98,12 +95,12 @@ def test_what_fails_is_not_a_number_and_says_no_more():
 
 
 def test_a_peer_that_is_not_there_is_told(monkeypatch):
-    with pytest.raises(InputError, match=r"peer = euler: allowed is scipy_dop853 or"):
-        engines.prepare("euler", Scene(), "sliding", 4, 1e-3)
+    with pytest.raises(InputError, match=r"method = euler: allowed is symplectic_euler or"):
+        stepper.ready("euler", Scene(), "sliding", 4, 4)
     engine = Peer(lambda: importlib.import_module("stiffdice_engine"), "Engine", "the package engine", "make it")
     monkeypatch.setitem(PEERS, "engine", engine)
-    with pytest.raises(InputError, match="peer = engine: needs the package engine, which is not installed; make it"):
-        engines.prepare("engine", Scene(), "sliding", 4, 1e-3)
+    with pytest.raises(InputError, match="method = engine: needs the package engine, which is not installed; make it"):
+        stepper.ready("engine", Scene(), "sliding", 4, 4)
 
 
 def test_scipy_is_imported_by_its_peers_only_and_these_by_whom_they_are_asked_for():

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.state import Array, start_of
+from stiffdice.dynamics.state import Array
 from stiffdice.experiments.engines.limits import METHODS
 from stiffdice.experiments.layout import enum, method_axis, quantity
 from stiffdice.experiments.timing import Launched, interleaved, machine
@@ -45,11 +45,10 @@ def time(
     seconds, spread, taken = np.full((3, len(TIMED), len(names)), np.nan)
     for p, problem in enumerate(PROBLEMS[name] for name in TIMED):
         there = scene_of(problem, scene, scene.ground.stiffness)
-        launch = start_of(there, problem.model)
         fit = [k for k, name in enumerate(names) if stepper.unfit(name, there, problem.model) is None]
-        runs = [Launched(stepper.ready(names[k], there, problem.model, launch, steps, SAMPLES)) for k in fit]
+        runs = [Launched(stepper.ready(names[k], there, problem.model, steps, SAMPLES)) for k in fit]
         own = [stepper.own_steps(names[k]) for k in fit]
-        counted: Array = np.array([run.ready()() for run in runs])  # what is not compiled yet is now
+        counted: Array = np.array([run.ready()().evaluations for run in runs])  # what is not compiled yet is now
         taken[p, fit] = np.where(own, counted, steps)
         seconds[p, fit], spread[p, fit] = interleaved(runs, rounds, affordable)
     attributes = dataset.provenance_attributes("Steps a second", scene, "problem", "method", __name__)

@@ -19,11 +19,10 @@ from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import fixed_step as stepping
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS
-from stiffdice.simulation.fixed_step import Path
+from stiffdice.simulation.engines.stepper import Path
 from stiffdice.simulation.run import simulate
 
 # Schemes whose error does not depend on the step, and that know flat landings only.
@@ -95,12 +94,9 @@ def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Ite
         before, rung = steps, rung + 1
 
 
-def plain(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], Path]:
-    """Return a function that makes a run step by step, from the launch, every time it is called."""
-    if method in PEERS:
-        return engines.prepare(method, scene, problem.model, SAMPLES, effort.tolerance, effort.steps)
-    tolerance = schemes.TOLERANCE if math.isnan(effort.tolerance) else effort.tolerance
-    return stepping.prepare(scene, problem.model, method, SAMPLES, effort.steps, tolerance)
+def plain(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], Callable[[], Path]]:
+    """Return a function that starts a run from the launch, and returns another that makes it step by step."""
+    return stepper.ready(method, scene, problem.model, effort.steps or SAMPLES, SAMPLES, effort.tolerance)
 
 
 def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget: int) -> Path:
@@ -109,7 +105,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
     budget: most steps to compute one by one; a run that needs more has not-a-number from there on.
     """
     if method in PEERS or not fixed_step(method):
-        return plain(problem, scene, method, effort)()
+        return plain(problem, scene, method, effort)()()
     run = simulate(
         scene,
         model=problem.model,

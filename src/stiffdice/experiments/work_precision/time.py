@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from stiffdice.dynamics.state import start_of
 from stiffdice.experiments import options
 from stiffdice.experiments.layout import method_axis, of_cells, quantity
 from stiffdice.experiments.timing import Launched, Times, interleaved, machine, seconds_of
@@ -18,7 +17,6 @@ from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
-from stiffdice.simulation.engines.registry import ENGINES
 
 
 class Rung(NamedTuple):
@@ -108,7 +106,7 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
     for effort in ladder(scene, method, per_decade, math.inf):
         if fixed_step(method) and rungs and took * effort.steps / rungs[-1].effort.steps > affordable:
             break
-        run = _timed(problem, scene, method, effort)
+        run = Launched(plain(problem, scene, method, effort))
         first = took = seconds_of(run)
         if not rungs:  # it may have compiled
             took = seconds_of(run)
@@ -116,11 +114,3 @@ def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affor
         if took > _END * affordable:
             break
     return rungs[-_RUNGS:] if fixed_step(method) else rungs
-
-
-def _timed(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], object]:
-    """Return a run to be timed; an engine builds its model of the scene before."""
-    if method not in ENGINES:
-        return plain(problem, scene, method, effort)
-    launch = start_of(scene, problem.model)
-    return Launched(stepper.ready(method, scene, problem.model, launch, effort.steps, SAMPLES))

@@ -13,10 +13,10 @@ from typing import Any
 
 from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import Physics
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.monitor import settled
 from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.task import System
 
 MEASURE = "apex_ratio"
 LONG_NAME = "largest apex over the apex before it, heights above touch-down"
@@ -36,18 +36,16 @@ def default_hop_height(scene: Scene) -> float:
 
 
 @njit
-def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
+def start(slots: Any, sight: Any, system: System, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
     slots[0] = 0.0
     slope = sight.speed - sight.lag * sight.step_size * sight.pull
-    held = energy.elastic(physics, state) / physics.mass
+    held = energy.elastic(system.physics, state) / system.physics.mass
     slots[1] = slope * slope / 2 + sight.pull * sight.clearance + held
 
 
 @njit
-def observe(
-    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
-) -> tuple[float, bool]:
+def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.lifted > 0.0:
         now = sight.speed_out * sight.speed_out / 2

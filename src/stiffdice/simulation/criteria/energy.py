@@ -22,6 +22,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import speed_of
 from stiffdice.dynamics.state import Physics
 from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.task import System
 
 MEASURE = "energy_ratio"
 LONG_NAME = "largest energy over that of the launch, in the air or of a cube that never flew"
@@ -34,11 +35,12 @@ SLOTS = 4
 
 
 @njit
-def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> None:
+def start(slots: Any, sight: Any, system: System, state: Any) -> None:
     """Begin to watch a run that stands at its launch."""
+    physics = system.physics
     grounded = sight.clearance <= 0.0
     slots[3] = 1.0 if grounded else 0.0
-    slots[1] = _mechanical(sight, model, law, physics, state) if grounded else _flying(sight, physics, state)
+    slots[1] = _mechanical(sight, system, state) if grounded else _flying(sight, physics, state)
     # On a slope the zero of m g z means nothing: height counts from the ground right below.
     weight = physics.mass * physics.gravity * abs(physics.nz)
     high = weight * (max(0.0, sight.height - physics.side / 2) + sight.sag / 2)
@@ -50,16 +52,14 @@ def start(slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state:
 
 
 @njit
-def observe(
-    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
-) -> tuple[float, bool]:
+def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.flight > 0.0:
         slots[3] = 0.0
-        _count(slots, _flying(sight, physics, state))
+        _count(slots, _flying(sight, system.physics, state))
     elif slots[3] > 0.0:
-        _count(slots, _mechanical(sight, model, law, physics, state))
-        _count(slots, _without_springs(physics, state))
+        _count(slots, _mechanical(sight, system, state))
+        _count(slots, _without_springs(system.physics, state))
     return slots[0], sight.held > 0.0
 
 
@@ -92,9 +92,8 @@ def _flying(sight: Any, physics: Physics, state: Any) -> float:
 
 
 @njit
-def _mechanical(sight: Any, model: Any, law: Any, physics: Physics, state: Any) -> float:
+def _mechanical(sight: Any, system: System, state: Any) -> float:
     """Return kinetic energy + m g z + the springs' [J], the velocity taken at the place."""
-    behind = sight.lag * sight.step_size
-    return energy.kinetic_at_place(model, law, physics, state, behind) + (
-        energy.potential(physics, state) + energy.elastic(physics, state)
-    )
+    physics, behind = system.physics, sight.lag * sight.step_size
+    moving = energy.kinetic_at_place(system.model, system.law, physics, state, behind)
+    return moving + (energy.potential(physics, state) + energy.elastic(physics, state))

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import Physics
 from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.task import System
 
 MEASURE = "out_of_range"
 LONG_NAME = "1 if a number left the range of doubles"
@@ -19,9 +19,7 @@ SLOTS = 1  # the measure
 
 
 @njit
-def observe(
-    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
-) -> tuple[float, bool]:
+def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     total = 0.0
     for axis in range(3):

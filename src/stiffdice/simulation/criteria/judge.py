@@ -11,10 +11,10 @@ from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
-from stiffdice.scene.scene import Scene
+from stiffdice.simulation.backend import Setup
 from stiffdice.simulation.criteria.registry import CRITERIA, holds
 from stiffdice.simulation.outcome import BLOW_UP, Verdict, gravest
-from stiffdice.simulation.task import Task
+from stiffdice.simulation.task import Members, Task
 
 Flags = npt.NDArray[np.bool_]
 
@@ -60,46 +60,40 @@ def endings_of(task: Task) -> dict[Verdict, Flags]:
 
     Those are the verdicts that the last state, the launch, the steps and the budget tell.
     """
-    setup, watched = task.setup, task.watched
-    touched = watched.sight["touched"] > 0
+    setup, members = task.setup, task.members
     return {
-        Verdict.UNRESOLVED: unresolved(
-            setup.scene, setup.model, setup.own_scheme, setup.steps, touched, task.launches, task.ensemble
-        ),
-        Verdict.SANK: sunk(task.physics, task.ensemble, watched.memory, watched.sight),
+        Verdict.UNRESOLVED: unresolved(setup, members.sight["touched"] > 0, task.launches, members.ensemble),
+        Verdict.SANK: sunk(task.system.physics, members),
         Verdict.STALLED: stalled(task.launches, setup.step_size),
-        Verdict.UNDECIDED: (watched.steps_done < setup.steps) & (watched.spent >= task.budget),
+        Verdict.UNDECIDED: (members.steps_done < setup.steps) & (members.spent >= task.limits.budget),
     }
 
 
-def unresolved(
-    scene: Scene, model: str, scheme: str | None, steps: int, touched: Flags, launches: States, ends: States
-) -> Flags:
+def unresolved(setup: Setup, touched: Flags, launches: States, ends: States) -> Flags:
     """Return whether steps were too long for what a run met, shape (member,).
 
     That is: beyond the linear limit of a contact where it touched the ground, beyond that of the ungated law's drag
-    anywhere, or more than half a turn in a step, at the launch or at the end. scheme: None for an engine's own.
+    anywhere, or more than half a turn in a step, at the launch or at the end. An engine's limits are its own.
     """
-    fewest = np.zeros(len(launches))
-    if scheme is not None:
+    scene, model, scheme, fewest = setup.scene, setup.model, setup.scheme, np.zeros(len(launches))
+    if setup.ours:
         contact, drag = linear_stability.fewest_steps(scene, model, scheme)
         fewest = np.maximum(np.where(touched, contact, 0.0), drag)
     if model in TURNING & TOUCHING and scheme not in schemes.OWN_STEPS:
         for states in (launches, ends):
             fewest = np.fmax(fewest, linear_stability.half_turn_steps(scene, states["angular_momentum"]))
-    return np.asarray(steps < fewest)
+    return np.asarray(setup.steps < fewest)
 
 
-def sunk(physics: Physics, ends: States, memory: npt.NDArray[np.void], sight: npt.NDArray[np.void]) -> Flags:
+def sunk(physics: Physics, members: Members) -> Flags:
     """Return whether every node ended below the ground, shape (member,), and not just in the middle of a bounce.
 
     A bounce ends, if the cube rests with its upper nodes out, and is no deeper than the energy of the launch takes it.
     """
-    normal = np.array([physics.nx, physics.ny, physics.nz])
+    ends, sag = members.ensemble, members.sight["sag"]
     with np.errstate(all="ignore"):  # a run that blew up has infinite heights
-        heights = along(ends["position"][:, None, :] + ends["node_offset"], normal)
-        fall = np.sqrt(memory["energy"][:, 2] / (2 * physics.stiffness))
-    sag = sight["sag"]
+        heights = along(ends["position"][:, None, :] + ends["node_offset"], (physics.nx, physics.ny, physics.nz))
+        fall = np.sqrt(members.memory["energy"][:, 2] / (2 * physics.stiffness))
     bounces = (sag < physics.side) & (-heights.min(axis=1) <= 2 * sag + fall)
     return np.asarray((heights < 0).all(axis=1) & ~bounces)
 

@@ -17,7 +17,9 @@ import numpy.typing as npt
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.state import TURNING, Array
 from stiffdice.errors import InputError
+from stiffdice.simulation import monitor
 from stiffdice.simulation.criteria import apex, energy, finite, restitution, trajectory
+from stiffdice.simulation.task import Member, Members, System
 
 # In the order in which a run is asked; the numbers of the enum in files.
 CRITERIA: dict[str, Any] = {
@@ -87,51 +89,64 @@ def open_of(memory: Any) -> int:
 
 
 def _none(*arguments: Any) -> int:
-    """Stand for the criteria after the last one."""
+    """Stand for the criteria after the last one, and for a `start` that a criterion has not."""
     return 0
 
 
-def _starting(names: list[str]) -> Any:
-    """Return a compiled function that lets the criteria of these names begin to watch."""
-    if not names:
-        return njit(_none)
-    name = names[0]
-    this, others = CRITERIA[name].start, _starting(names[1:])
+def _chained(names: list[str]) -> tuple[Any, Any]:
+    """Return compiled functions that let the criteria of these names begin to watch, and that show them a step.
 
-    @njit
-    def start(memory: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any) -> None:
-        this(memory[name], sight, model, law, physics, state)
-        others(memory, sight, model, law, physics, state)
-
-    return start
-
-
-def _observing(names: list[str]) -> Any:
-    """Return a compiled function that shows a step to the criteria of these names, one after another.
-
-    It is put together at import, because compiled code cannot loop over functions; called by its global name it costs
-    nothing and leaves the kernel cacheable on disk.
+    They are put together at import, because compiled code cannot loop over functions; called by its global name each
+    costs nothing and leaves the kernel cacheable on disk.
     """
     if not names:
-        return njit(_none)
+        return njit(_none), njit(_none)
     name, k = names[0], list(CRITERIA).index(names[0])
-    this, others = CRITERIA[name].observe, _observing(names[1:])
+    start_this, observe_this = getattr(CRITERIA[name], "start", njit(_none)), CRITERIA[name].observe
+    start_others, observe_others = _chained(names[1:])
 
     @njit
-    def observe(memory: Any, step: Any, sight: Any, model: Any, law: Any, physics: Any, state: Any, ref: Any) -> int:
-        measure, settled = this(memory[name], sight, model, law, physics, state, ref)
+    def start(memory: Any, sight: Any, system: Any, state: Any) -> None:
+        start_this(memory[name], sight, system, state)
+        start_others(memory, sight, system, state)
+
+    @njit
+    def observe(memory: Any, step: Any, sight: Any, system: Any, state: Any, reference: Any) -> int:
+        measure, settled = observe_this(memory[name], sight, system, state, reference)
         newly = 0
         if memory.decided[k] == 0 and (settled or measure > memory.limits[k]):
             memory.decided[k] = step
             newly = 1 if memory.limits[k] < np.inf else 0
-        return newly + others(memory, step, sight, model, law, physics, state, ref)
+        return newly + observe_others(memory, step, sight, system, state, reference)
 
-    return observe
+    return start, observe
 
 
-# (memory, sight, model, law, physics, state): begin to watch a run that stands at its launch.
-start = _starting([name for name, criterion in CRITERIA.items() if hasattr(criterion, "start")])
+_start, _observe = _chained(list(CRITERIA))
 
-# (memory, step, sight, model, law, physics, state, reference) -> how many of the criteria that have a limit this step
-# decides. A criterion is decided when it fails, or can fail no more.
-observe = _observing(list(CRITERIA))
+
+@njit(cache=True)
+def start(system: System, members: Members) -> None:
+    """Let monitor and criteria look at members that stand at their launch."""
+    for m in range(len(members.ensemble)):
+        state, sight = members.ensemble[m], members.sight[m]
+        monitor.start(sight, system.physics, state)
+        _start(members.memory[m], sight, system, state)
+
+
+@njit
+def observe(system: System, member: Member, step: int, flown: int) -> int:
+    """Show a member's state after a step to monitor and criteria; return how many that have a limit this decides.
+
+    A criterion is decided when it fails, or can fail no more. flown: steps of free flight that went by unseen before.
+    """
+    state, sight, memory, reference = member
+    monitor.observe(sight, system.physics, state, step, flown)
+    return int(_observe(memory, step, sight, system, state, reference))
+
+
+@njit(cache=True)
+def finish(system: System, members: Members) -> None:
+    """Let the energy look at the last state of each member."""
+    for m in range(len(members.ensemble)):
+        energy.finish(members.memory[m].energy, members.sight[m], system.physics, members.ensemble[m])

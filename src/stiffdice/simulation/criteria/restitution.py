@@ -12,9 +12,9 @@ from typing import Any
 from stiffdice.dynamics import flat_bounce
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import room_of
-from stiffdice.dynamics.state import Physics
 from stiffdice.simulation.monitor import settled
 from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.task import System
 
 MEASURE = "restitution_error"
 LONG_NAME = "largest difference of a bounce's restitution from the contact law's, over the flat landings"
@@ -26,17 +26,16 @@ SLOTS = 1  # the measure
 
 
 @njit
-def observe(
-    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
-) -> tuple[float, bool]:
+def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more; not-a-number after any other landing."""
+    physics = system.physics
     blow = sight.speed_in * sight.speed_in / 2
     if sight.lifted > 0.0 and blow > 0.0 and blow >= settled(sight) and sight.pull >= 0.0 and physics.stiffness > 0.0:
         free = room_of(physics, state)
         # An undamped cube goes deepest: its sag twice, and v/ω.
         depth = 2 * sight.sag + sight.speed_in * math.sqrt(physics.mass / 4 / physics.stiffness)
         if depth < free and not math.isnan(slots[0]):
-            out = flat_bounce.rebound_speed(law, physics, sight.pull, sight.speed_in)
+            out = flat_bounce.rebound_speed(system.law, physics, sight.pull, sight.speed_in)
             slots[0] = max(slots[0], abs(sight.speed_out - out) / sight.speed_in)
         else:
             slots[0] = math.nan

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import Physics
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.reference import distance
+from stiffdice.simulation.task import System
 
 MEASURE = "trajectory_error"
 LONG_NAME = "largest distance from the reference before the horizon, in radii of the cube"
@@ -20,14 +20,12 @@ SLOTS = 1  # the measure
 
 
 @njit
-def observe(
-    slots: Any, sight: Any, model: Any, law: Any, physics: Physics, state: Any, reference: Any
-) -> tuple[float, bool]:
+def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) -> tuple[float, bool]:
     """Return the measure so far, and whether nothing can change it any more."""
     if reference.horizon < 0.0:
         slots[0] = math.nan
         return slots[0], False
     if sight.time > reference.horizon:
         return slots[0], True
-    slots[0] = max(slots[0], distance(reference, sight.time, state) / physics.radius)
+    slots[0] = max(slots[0], distance(reference, sight.time, state) / system.physics.radius)
     return slots[0], False

@@ -10,16 +10,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
-import numpy as np
-
-from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.errors import InputError, NotInstalledError
-from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import Engine
-from stiffdice.simulation.fixed_step import Path
 
 
 class Peer(NamedTuple):
@@ -123,29 +117,3 @@ def check_fit(peer: str, scene: Scene, model: str, key: str = "simulator") -> No
     why = adapter_of(peer, key).unfit(scene, model)
     if why is not None:
         raise InputError(f"{key} = {peer}: {why}")
-
-
-def prepare(peer: str, scene: Scene, model: str, samples: int, tolerance: float, steps: int = 0) -> Callable[[], Path]:
-    """Return a function that makes a peer's run, from the launch, every time it is called; its start is included.
-
-    samples: equal parts of the duration, after each of which the state is kept. tolerance [1]: relative, as the peer
-    understands it; not-a-number where it looks at none. steps: a multiple of `samples`, for an engine of fixed step; 0
-    for a peer that takes its own.
-    Raises InputError for an unknown peer, a scene that it cannot represent, and where it is not installed.
-    """
-    engine_of = adapter_of(peer, "peer")
-    validation.choice("model", model, MODELS)
-    check_fit(peer, scene, model, "peer")
-    every = max(1, steps // validation.count("samples", samples))
-    if steps % samples:
-        raise InputError(f"steps = {steps}: allowed is a multiple of samples = {samples}")
-    wanted = schemes.TOLERANCE if np.isnan(tolerance) else tolerance
-
-    def run() -> Path:
-        states = np.zeros(samples + 1, STATE)
-        states[:1] = start_of(scene, model)
-        engine = engine_of(scene, model, states[:1], scene.duration / (samples * every), wanted, None)
-        evaluations = engine.advance(states[1:], every)
-        return Path(states, evaluations, evaluations)
-
-    return run

@@ -26,6 +26,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import ode, odeint, solve_ivp
 
 from stiffdice.dynamics.compilation import njit
@@ -34,6 +35,7 @@ from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, TURNING, Array, Physics, States, physics_of, start_of
+from stiffdice.integrators.event_driven.active_set import NODES, SIZE, give, normalise, quaternion_rate
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import Engine
 
@@ -46,65 +48,47 @@ _MOST_STEPS = 100_000
 # Of a difference that stands for a derivative, in units of each component's natural size.
 _NUDGE = 1e-9
 
-_NUMBERS = len(Physics._fields)
+# What the equations need beside the motion, one record, as named tuples take longer to hand over. nodes: at the launch;
+# motion: as in `active_set`, its quaternion made a unit; state: which that stands for.
+_ROOM = np.dtype(
+    [
+        ("physics", [(name, np.float64) for name in Physics._fields]),
+        ("nodes", np.float64, (NODES, 3)),
+        ("motion", np.float64, SIZE),
+        ("state", STATE),
+    ]
+)
+Room = npt.NDArray[np.void]
 
-Slope = Callable[[float, Array, Array, States], Array]
-Slopes = Callable[[float, Array, Array, States, Array], Array]
+Slope = Callable[[float, Array, Room], Array]
+Slopes = Callable[[float, Array, Room, Array], Array]
 
 
 @njit
-def _physics(numbers: Array) -> Physics:
-    """Return the scene's numbers; a named tuple takes longer to hand over than an array."""
-    n = numbers
-    return Physics(
-        n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13], n[14]
-    )  # fmt: skip
-
-
-@njit
-def _put(model: Any, numbers: Array, y: Array, state: Any) -> None:
+def _put(model: Any, y: Array, room: Any) -> None:
     """Make the state that a solution vector stands for; its quaternion need not be a unit."""
-    for axis in range(3):
-        state.position[axis] = y[axis]
-        state.velocity[axis] = y[3 + axis]
-    nodes = state.node_offset
-    if not models.turns(model):
-        for k in range(nodes.shape[0]):
-            for axis in range(3):
-                nodes[k, axis] = numbers[_NUMBERS + 3 * k + axis]
-        return
-    for axis in range(3):
-        state.angular_momentum[axis] = y[10 + axis]
-        state.angular_velocity[axis] = y[10 + axis] / _physics(numbers).inertia
-    w, x, y_, z = y[6], y[7], y[8], y[9]
-    length = math.sqrt(w * w + x * x + y_ * y_ + z * z)
-    w, x, y_, z = w / length, x / length, y_ / length, z / length
-    for k in range(nodes.shape[0]):
-        a, b, c = (numbers[_NUMBERS + 3 * k], numbers[_NUMBERS + 3 * k + 1], numbers[_NUMBERS + 3 * k + 2])
-        tx, ty, tz = 2 * (y_ * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y_ * a)
-        nodes[k, 0] = a + w * tx + (y_ * tz - z * ty)
-        nodes[k, 1] = b + w * ty + (z * tx - x * tz)
-        nodes[k, 2] = c + w * tz + (x * ty - y_ * tx)
+    turning = bool(models.turns(model))
+    for part in range(y.shape[0]):
+        room.motion[part] = y[part]
+    if turning:
+        normalise(room.motion)
+    give(turning, room.physics, room.nodes, room.motion, room.state)
 
 
 @njit
-def _rate(model: Any, law: Any, y: Array, numbers: Array, room: States) -> Array:
-    """Return dy/dt: velocity and force over mass; for a turning cube the quaternion's rate, q' = ω q/2, and torque."""
-    physics, state = _physics(numbers), room[0]
-    _put(model, numbers, y, state)
-    wrench = models.force(model, law, physics, state)
+def _rate(model: Any, law: Any, y: Array, room: Any) -> Array:
+    """Return dy/dt: velocity and force over mass; for a turning cube torque, and the quaternion's rate."""
+    _put(model, y, room)
+    wrench = models.force(model, law, room.physics, room.state)
     rate = np.empty(y.shape[0])
     for axis in range(3):
         rate[axis] = y[3 + axis]
-        rate[3 + axis] = wrench[axis] / physics.mass
+        rate[3 + axis] = wrench[axis] / room.physics.mass
     if models.turns(model):
-        wx, wy, wz = state.angular_velocity[0], state.angular_velocity[1], state.angular_velocity[2]
-        rate[6] = -(wx * y[7] + wy * y[8] + wz * y[9]) / 2
-        rate[7] = (wx * y[6] + wy * y[9] - wz * y[8]) / 2
-        rate[8] = (wy * y[6] + wz * y[7] - wx * y[9]) / 2
-        rate[9] = (wz * y[6] + wx * y[8] - wy * y[7]) / 2
-        for axis in range(3):
-            rate[10 + axis] = wrench[3 + axis]
+        spin = room.state.angular_velocity
+        rate[6], rate[7], rate[8] = wrench[3], wrench[4], wrench[5]
+        turned = quaternion_rate(spin[0] / 2, spin[1] / 2, spin[2] / 2, y[9], y[10], y[11], y[12])
+        rate[9], rate[10], rate[11], rate[12] = turned
     return rate
 
 
@@ -112,24 +96,21 @@ def _rate(model: Any, law: Any, y: Array, numbers: Array, room: States) -> Array
 def equations(model: str, law: str) -> tuple[Slope, Slopes]:
     """Return dy/dt and its Jacobian, compiled for one model and contact law: tags to hand over would double the time.
 
-    (t, y, numbers, room) -> dy/dt. (t, y, numbers, room, sizes) -> its Jacobian by differences, shape (component,
-    component).
+    (t, y, room) -> dy/dt. (t, y, room, sizes) -> its Jacobian by differences, shape (component, component).
     """
     model_tag, law_tag = MODELS[model], LAWS[law]
 
     @njit(cache=True)
-    def slope(t: float, y: Array, numbers: Array, room: States) -> Array:
-        return _rate(model_tag, law_tag, y, numbers, room)
+    def slope(t: float, y: Array, room: Room) -> Array:
+        return _rate(model_tag, law_tag, y, room[0])
 
     @njit(cache=True)
-    def slopes(t: float, y: Array, numbers: Array, room: States, sizes: Array) -> Array:
+    def slopes(t: float, y: Array, room: Room, sizes: Array) -> Array:
         size = y.shape[0]
-        here, there, jacobian = _rate(model_tag, law_tag, y, numbers, room), y.copy(), np.empty((size, size))
+        here, there, jacobian = _rate(model_tag, law_tag, y, room[0]), y.copy(), np.empty((size, size))
         for j in range(size):
             there[j] = y[j] + _NUDGE * sizes[j]
-            moved = _rate(model_tag, law_tag, there, numbers, room)
-            for i in range(size):
-                jacobian[i, j] = (moved[i] - here[i]) / (there[j] - y[j])
+            jacobian[:, j] = (_rate(model_tag, law_tag, there, room[0]) - here) / (there[j] - y[j])
             there[j] = y[j]
         return jacobian
 
@@ -137,9 +118,17 @@ def equations(model: str, law: str) -> tuple[Slope, Slopes]:
 
 
 @njit(cache=True)
-def _states(model: Any, numbers: Array, solution: Array, states: States) -> None:
+def _states(model: Any, solution: Array, room: Room, states: States) -> None:
     for k in range(states.shape[0]):
-        _put(model, numbers, solution[k], states[k])
+        _put(model, solution[k], room[0])
+        states[k] = room[0].state
+
+
+def room_of(scene: Scene, launch: States) -> Room:
+    """Return what the equations need to know of a scene and a launch, shape (1,)."""
+    room = np.zeros(1, _ROOM)
+    room["physics"], room["nodes"], room["state"] = tuple(physics_of(scene)), launch["node_offset"], launch
+    return room
 
 
 class _Solver(Engine):
@@ -153,10 +142,9 @@ class _Solver(Engine):
         (launch,) = self.launch
         parts = [launch["position"], launch["velocity"]]
         if self.model in TURNING:
-            parts += [[1.0, 0.0, 0.0, 0.0], launch["angular_momentum"]]
+            parts += [launch["angular_momentum"], [1.0, 0.0, 0.0, 0.0]]
         self._y, self._sizes = np.concatenate(parts), _sizes(self.scene, self.model)
-        self._numbers: Array = np.array([*physics_of(self.scene), *launch["node_offset"].ravel()])
-        self._room = np.zeros(1, STATE)
+        self._room = room_of(self.scene, self.launch)
         self._plain, self._slopes = equations(self.model, self.scene.ground.contact)
         # A counter in Python takes a part of the time of an evaluation.
         self._slope: Slope = self._plain if self.most is None else self._counted
@@ -178,16 +166,16 @@ class _Solver(Engine):
                     solution[: len(found)] = found
                 except _SpentError:
                     evaluations = (self.most or 0) - before
-        _states(MODELS[self.model], self._numbers, solution[1:], states)
+        _states(MODELS[self.model], solution[1:], self._room, states)
         self._y = solution[-1]
         return evaluations
 
-    def _counted(self, t: float, y: Array, numbers: Array, room: States) -> Array:
+    def _counted(self, t: float, y: Array, room: Room) -> Array:
         """Return dy/dt. Between two of these Python sees a signal, which within odeint it does not."""
         self._evaluations += 1
         if self._evaluations > (self.most or 0):
             raise _SpentError
-        return self._plain(t, y, numbers, room)
+        return self._plain(t, y, room)
 
     def _solve(self, times: Array) -> tuple[Array, int]:
         """Return the solution at these times [s], shape (time, component), fewer if it fails, and evaluations."""
@@ -209,7 +197,7 @@ class Dop853(_Solver):
         def counted(t: float, y: Array) -> Array:
             nonlocal evaluations
             evaluations += 1
-            return self._slope(t, y, self._numbers, self._room)
+            return self._slope(t, y, self._room)
 
         solver = ode(counted)
         absolute = float(ABSOLUTE * self.tolerance * self._sizes.min())  # it takes one for all
@@ -234,7 +222,7 @@ class Lsoda(_Solver):
             self._slope,
             self._y,
             times,
-            args=(self._numbers, self._room),
+            args=(self._room,),
             tfirst=True,
             rtol=self.tolerance,
             atol=ABSOLUTE * self.tolerance * self._sizes,
@@ -252,14 +240,14 @@ class Radau(_Solver):
 
     def _solve(self, times: Array) -> tuple[Array, int]:
         found = solve_ivp(
-            lambda t, y: self._slope(t, y, self._numbers, self._room),
+            lambda t, y: self._slope(t, y, self._room),
             (times[0], times[-1]),
             self._y,
             method="Radau",
             t_eval=times,
             rtol=self.tolerance,
             atol=ABSOLUTE * self.tolerance * self._sizes,
-            jac=lambda t, y: self._slopes(t, y, self._numbers, self._room, self._sizes),
+            jac=lambda t, y: self._slopes(t, y, self._room, self._sizes),
         )
         return found.y.T, int(found.nfev + (len(self._y) + 1) * found.njev)
 
@@ -271,5 +259,5 @@ def _sizes(scene: Scene, model: str) -> Array:
     energy = max(energy, physics.mass * physics.gravity * physics.radius)
     sizes = [physics.radius] * 3 + [math.sqrt(2 * energy / physics.mass)] * 3
     if model in TURNING:
-        sizes += [1.0] * 4 + [math.sqrt(2 * energy * physics.inertia)] * 3
+        sizes += [math.sqrt(2 * energy * physics.inertia)] * 3 + [1.0] * 4
     return np.array(sizes, float)
