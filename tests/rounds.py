@@ -38,7 +38,7 @@ def compute(plan: Sweep, folder: Path) -> list[Path]:
         due = partition.rounds(partition.of(plan), number)
         cells = [shard.pieces for shard in due.values()]
         if number:
-            cells = partition.later(plan, judged(plan, made), number, len(due))
+            cells = partition.later(plan, judged(plan, made), number)
         for name, pieces in zip(due, cells, strict=True):
             made.append(folder / f"{name}.h5")
             compute_shard(plan, pieces, made[-1])

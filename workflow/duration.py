@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from collections.abc import Collection, Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 
 from stiffdice.study import eta, forecast, job_log
@@ -16,11 +15,7 @@ from stiffdice.study.outputs import Result
 from stiffdice.study.status_report import duration
 
 MEASURING = ("experiment", "timings")  # of which nothing tells better how long they take than how long they took
-OFTEN, SELDOM, LINES = (
-    20.0,
-    300.0,
-    8,
-)  # s between two lines, at least and at most; of what is left, at first, so many parts
+OFTEN, SELDOM, LINES = 20.0, 300.0, 8  # s between two lines, at least and at most; about so many lines
 CROWDED = 1.2  # times as long as alone that is worth a word
 
 
@@ -53,12 +48,11 @@ class Duration:
         It goes by how long the jobs that have ended took, next to what was expected of them.
         """
         jobs = self._jobs()
-        ended = [(job.took, job.weight) for job in jobs if job.took is not None]
-        pace = sum(took for took, _ in ended) / sum(weight for _, weight in ended) if ended else self._crowding
-        left = eta.of(jobs, self._cores, pace)
-        late = left.unknown and not left.seconds
-        rest = "what is left takes longer than foreseen" if late else f"about {duration(left.seconds)} left"
-        return f"{self._name}: {len(ended)} of {len(jobs)} jobs done, {rest}", left.seconds
+        seconds = eta.of(jobs, self._cores, self._crowding).seconds
+        late = not seconds and any(job.due for job in jobs)
+        rest = "what is left takes longer than foreseen" if late else f"about {duration(seconds)} left"
+        done = sum(job.took is not None and not job.due for job in jobs)
+        return f"{self._name}: {done} of {len(jobs)} jobs done, {rest}", seconds
 
     def tell(self) -> None:
         """Say at once how long it takes, and from now on what is left, as long as this process lives."""
@@ -77,13 +71,10 @@ class Duration:
 
     def _job(self, folder: Path, result: Result, weight: float) -> Job:
         """Return what is known of a job so far: nothing of an earlier run's."""
-        kind = f"shard {result.name.partition('/')[0]}" if result.stage == "shard" else result.stage
-        job = Job(kind, weight, None, due=True, alone=result.stage == "timings")
         told = job_log.read(folder / result.log)
         if told is None or told.begun is None or told.begun.timestamp() < self._begun - 1:  # told in whole seconds
-            return job
-        if told.ending:
-            took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
-            return job._replace(took=took, due=False)
-        elapsed, heard = ((when - told.begun).total_seconds() for when in (datetime.now(UTC), told.written))
-        return job._replace(elapsed=elapsed, progress=told.progress, told=heard)
+            told = None
+        if told is None or not told.ending:
+            return eta.job(result, weight, told, due=True, took=None)
+        took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
+        return eta.job(result, weight, None, due=False, took=took)

@@ -6,9 +6,11 @@ import json
 import os
 import re
 import zlib
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
+import psutil
 import pytest
 import xarray as xr
 
@@ -431,7 +433,7 @@ def test_values_beyond_the_end_are_refused(stored, image):
 
 
 def test_more_than_the_memory_is_not_loaded(stored, monkeypatch):
-    monkeypatch.setattr(os, "sysconf", {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 1}.__getitem__)
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(total=4096))
     with pytest.raises(InputError, match=f"{stored}: holds .* GB: this machine has 4.1e-06 GB of memory"):
         open_file(stored)
     assert len(list(parts(stored, 7))) == 29

@@ -159,7 +159,7 @@ def test_what_cannot_be_compared_is_refused(collected, problem):
     elif problem == "tolerance":
         other["tolerance"] = other.tolerance + 1
     elif problem == "stiffness":
-        other = other.assign_coords(stiffness=2 * other.stiffness)
+        other = other.assign_coords(cell_stiffness=2 * other.cell_stiffness)
     elif problem == "span of steps":
         other = other.assign_coords(cell_steps=100 * other.cell_steps)
     sweeps = {"dense": dense} if problem == "alone" else {"dense": dense, "other": other}

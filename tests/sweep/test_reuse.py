@@ -179,7 +179,7 @@ def test_shards_whose_steps_or_grounds_touch_the_asked_ones_but_for_round_off_ar
 def test_more_members_than_are_read_at_once_are_kept(small, folder, monkeypatch):
     kept = Kept(small, shards.scan(small), folder, ())
     (column, (steps, *_)), *_ = shards.scan(small)
-    whole = kept.runs(column, steps, slice(0, small.members))
+    whole = kept(column, steps)(slice(0, small.members))
     monkeypatch.setattr(reuse.reader, "RUNS_AT_ONCE", 1)
-    again = Kept(small, shards.scan(small), folder, ()).runs(column, steps, slice(0, small.members))
+    again = Kept(small, shards.scan(small), folder, ())(column, steps)(slice(0, small.members))
     np.testing.assert_equal(again, whole)

@@ -50,19 +50,19 @@ def study(name):
 
 
 @cache
-def planned_results(name):
-    """Return all results of a study; a link to nothing in the place of one ends Snakemake with exit status 2."""
+def needs_of(name):
+    """Return what each result of a study is made from; a link to nothing in the place of one ends Snakemake (2)."""
     with notes(f"stiffdice: planning the sweeps of {name}"):
-        found = results.of(study(name))
+        found = results.needs(study(name))
     for line in filter(None, (results.dangling(result, Path("results", name)) for result in found)):
         print(f"stiffdice: {printable(line)}", file=sys.stderr)
         sys.exit(2)
-    return found
+    return {(result.stage, result.name): (result, parts) for result, parts in found.items()}
 
 
 @cache
 def asked_by(name):
-    planned_results(name)
+    needs_of(name)
     return asked.of(study(name))
 
 
@@ -96,43 +96,18 @@ def not_stale(wildcards):
     return []
 
 
-def planned_run(wildcards):
-    return study(wildcards.study).runs[wildcards.run]
+def planned(kind):
+    """Return a parameter: what a study plans for a job, a `run`, `sweep`, `experiment`, `timing`, `figure` or `table`."""
+    return lambda wildcards: getattr(study(wildcards.study), f"{kind}s")[wildcards[kind]]
 
 
-def planned_sweep(wildcards):
-    return study(wildcards.study).sweeps[wildcards.sweep]
-
-
-def planned_experiment(wildcards):
-    return study(wildcards.study).experiments[wildcards.experiment]
-
-
-def planned_timing(wildcards):
-    return study(wildcards.study).timings[wildcards.timing]
-
-
-def planned_figure(wildcards):
-    return study(wildcards.study).figures[wildcards.figure]
-
-
-def planned_table(wildcards):
-    return study(wildcards.study).tables[wildcards.table]
-
-
-def sealed(planned):
-    """Return a parameter that Snakemake does not compare, as it does `asked`: what the study's file says of a job."""
-    return lambda wildcards: Sealed(planned(wildcards))
-
-
-@cache
-def shards_of(name, sweep):
-    """Return the shards of a sweep, by their ids."""
-    return shards.of(study(name).sweeps[sweep])
+def sealed(kind):
+    """Return the same as a parameter that Snakemake does not compare; it compares `asked`, which says more."""
+    return lambda wildcards: Sealed(planned(kind)(wildcards))
 
 
 def shard_of(wildcards):
-    return shards_of(wildcards.study, wildcards.sweep)[wildcards.shard]
+    return shards.of(planned("sweep")(wildcards))[wildcards.shard]
 
 
 def minutes_of(shard):
@@ -140,17 +115,14 @@ def minutes_of(shard):
     return 10 + 4 * math.ceil(shard.seconds / 60)
 
 
-def shard_files(wildcards, rounds):
-    """Return the shards of the first so many rounds of a sweep."""
-    top = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/shards"
-    plan = shards_of(wildcards.study, wildcards.sweep)
-    return [f"{top}/{shard}.h5" for number in range(rounds) for shard in shards.rounds(plan, number)]
+def made_from(kind, stage, name):
+    """Return an input: files of one stage that a result is made from; name: its own in its stage, with wildcards."""
 
+    def files(wildcards):
+        _, parts = needs_of(wildcards.study)[stage, name.format(**dict(wildcards.items()))]
+        return [f"results/{wildcards.study}/{part.files[0]}" for part in parts if part.stage == kind]
 
-def survey_files(wildcards, rounds):
-    """Return the surveys that say where the cells of the first so many rounds lie; the first needs none."""
-    top = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/surveys"
-    return [f"{top}/{number}.h5" for number in range(rounds - 1)]
+    return files
 
 
 def survey_of_shard(wildcards):
@@ -158,38 +130,25 @@ def survey_of_shard(wildcards):
 
     Of what depends by ancient files alone on a job that is due, Snakemake does not ask whether it is due itself.
     """
-    files = survey_files(wildcards, shard_of(wildcards).round + 1)[-1:]
+    files = made_from("survey", "shard", "{sweep}/{shard}")(wildcards)
     shard = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/shards/{wildcards.shard}.h5"
     return files if workflow.is_main_process and shard in stale_files(wildcards.study) else ancient(files)
 
 
-# Where the files of each kind are. Times are apart, with the other files that no two rebuilds share.
-PLACES = {
-    "sweeps": "sweeps/{}/frontier.h5",
-    "experiments": "experiments/{}.h5",
-    "timings": "benchmarks/timings/{}.h5",
-}
+def shown_by(stage, entries):
+    """Return an input: the files that a figure or a table shows, by their names; timings shown besides are apart."""
 
+    def files(wildcards):
+        draw = planned(stage)(wildcards).draw
+        _, parts = needs_of(wildcards.study)["animation" if draw == "animation" else stage, wildcards[stage]]
+        found = {}
+        for part in parts:
+            name = part.name.partition(".")[2] if part.stage == "trajectory" else part.name
+            timed = part.stage == "timings" and entries[draw].given != "timings"
+            found[f"{name} timed" if timed else name] = f"results/{wildcards.study}/{part.files[0]}"
+        return found
 
-def found_by(name, planned, kind):
-    """Return the files that a figure or a table shows, by their names; those of timings shown besides are apart."""
-    files = {source: f"results/{name}/{PLACES[kind].format(source)}" for source in planned.of}
-    timings = {f"{source} timed": f"results/{name}/{PLACES['timings'].format(source)}" for source in planned.timings}
-    return files | timings
-
-
-def data_of_figure(wildcards):
-    """Return the files a figure is drawn from: a run in each preset, or what sweeps or experiments found."""
-    planned = planned_figure(wildcards)
-    if planned.run is None:
-        return found_by(wildcards.study, planned, DRAWINGS[planned.draw].given)
-    presets = study(wildcards.study).runs[planned.run].presets
-    return {preset: f"results/{wildcards.study}/runs/{planned.run}.{preset}.h5" for preset in presets}
-
-
-def data_of_table(wildcards):
-    planned = planned_table(wildcards)
-    return found_by(wildcards.study, planned, TABLES[planned.draw].given)
+    return files
 
 
 def growing(amount):
@@ -294,7 +253,7 @@ def tell_left_out(name):
 def everything_of(name):
     """Return all results of a study; what needs an engine that is not installed is left out, with a line."""
     tell_left_out(name)
-    return [f"results/{name}/{file}" for result in planned_results(name) for file in result.files]
+    return [f"results/{name}/{file}" for result, _ in needs_of(name).values() for file in result.files]
 
 
 # A mistake in the study asked for is told before anything else is said.

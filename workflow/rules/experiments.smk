@@ -7,7 +7,7 @@ rule experiment:
     output:
         "results/{study}/experiments/{experiment}.h5",
     params:
-        planned=sealed(planned_experiment),
+        planned=sealed("experiment"),
         asked=asked_of("experiment", "{experiment}"),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
@@ -29,7 +29,7 @@ use rule experiment as timing with:
     output:
         "results/{study}/benchmarks/timings/{timing}.h5",
     params:
-        planned=sealed(planned_timing),
+        planned=sealed("timing"),
         asked=asked_of("timings", "{timing}"),
     log:
         "results/{study}/logs/timings/{timing}.log",

@@ -4,7 +4,7 @@
 rule figure:
     input:
         not_stale,
-        unpack(data_of_figure),
+        unpack(shown_by("figure", DRAWINGS)),
     output:
         report(
             "results/{study}/figures/{figure}.svg",
@@ -14,7 +14,7 @@ rule figure:
         ),
         "results/{study}/figures/{figure}.png",
     params:
-        planned=sealed(planned_figure),
+        planned=sealed("figure"),
         dpi=lambda wildcards: study(wildcards.study).dpi,
         asked=asked_of("figure", "{figure}"),
     log:
@@ -39,7 +39,7 @@ use rule figure as animation with:
             labels={"what": "{figure}"},
         ),
     params:
-        planned=sealed(planned_figure),
+        planned=sealed("figure"),
         dpi=80,  # for screens, whatever the study asks of its PNG files
         asked=asked_of("animation", "{figure}"),
     log:
@@ -51,7 +51,7 @@ use rule figure as animation with:
 rule table:
     input:
         not_stale,
-        unpack(data_of_table),
+        unpack(shown_by("table", TABLES)),
     output:
         markdown=report(
             "results/{study}/tables/{table}.md",
@@ -61,7 +61,7 @@ rule table:
         ),
         csv="results/{study}/tables/{table}.csv",
     params:
-        planned=sealed(planned_table),
+        planned=sealed("table"),
         asked=asked_of("table", "{table}"),
     log:
         "results/{study}/logs/table/{table}.log",

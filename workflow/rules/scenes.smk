@@ -7,7 +7,7 @@ rule trajectory:
     output:
         "results/{study}/runs/{run}.{preset}.h5",
     params:
-        planned=sealed(planned_run),
+        planned=sealed("run"),
         asked=asked_of("trajectory", "{run}.{preset}"),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",

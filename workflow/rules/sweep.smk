@@ -10,7 +10,7 @@ rule shard:
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
     params:
-        planned=sealed(planned_sweep),
+        planned=sealed("sweep"),
         asked=asked_of("shard", "{sweep}/{shard}"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
@@ -30,12 +30,12 @@ rule shard:
 rule survey:
     input:
         not_stale,
-        shards=lambda wildcards: shard_files(wildcards, int(wildcards.round) + 1),
-        surveys=lambda wildcards: survey_files(wildcards, int(wildcards.round) + 1),
+        shards=made_from("shard", "survey", "{sweep}/{round}"),
+        surveys=made_from("survey", "survey", "{sweep}/{round}"),
     output:
         sweep="results/{study}/sweeps/{sweep}/surveys/{round}.h5",
     params:
-        planned=sealed(planned_sweep),
+        planned=sealed("sweep"),
         asked=asked_of("survey", "{sweep}/{round}"),
     log:
         "results/{study}/logs/survey/{sweep}/{round}.log",
@@ -54,13 +54,13 @@ rule survey:
 rule collect:
     input:
         not_stale,
-        shards=lambda wildcards: shard_files(wildcards, planned_sweep(wildcards).refine + 1),
-        surveys=lambda wildcards: survey_files(wildcards, planned_sweep(wildcards).refine + 1),
+        shards=made_from("shard", "collect", "{sweep}"),
+        surveys=made_from("survey", "collect", "{sweep}"),
     output:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
     params:
-        planned=sealed(planned_sweep),
+        planned=sealed("sweep"),
         asked=asked_of("collect", "{sweep}"),
     log:
         "results/{study}/logs/collect/{sweep}.log",

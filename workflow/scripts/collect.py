@@ -36,10 +36,7 @@ def _checked(job: Job, lines: list[str], say: Say) -> "Iterator[xr.Dataset]":
     asked, inputs = job.plan(), Inputs(say)
     plan = partition.of(asked)
     surveys = opened(((Path(path).stem, path) for path in job.input["surveys"]), say)
-    later = {
-        int(number) + 1: partition.later(asked, survey, int(number) + 1, len(partition.rounds(plan, int(number) + 1)))
-        for number, survey in surveys.items()
-    }
+    later = {int(number) + 1: partition.later(asked, part, int(number) + 1) for number, part in surveys.items()}
     for path in job.input["shards"]:
         shard = plan[Path(path).stem]
         pieces = later[shard.round][shard.part] if shard.round else shard.pieces

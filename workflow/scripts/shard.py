@@ -16,10 +16,10 @@ def make(job: Job, say: Say) -> None:
 
     planned, target = job.plan(), Path(job.output[0])
     plan = partition.of(planned)
-    number, part, parts, _, pieces = plan[target.stem]
+    number, part, _, pieces = plan[target.stem]
     if number:
         survey = opened([("survey", job.input["survey"][0])], say)["survey"]
-        pieces = partition.later(planned, survey, number, parts)[part]
+        pieces = partition.later(planned, survey, number)[part]
     kept = Kept(planned, pieces, target.parent, plan, say)
     watch = Stopwatch()
     with watch.running():

@@ -13,7 +13,7 @@ import numpy as np
 
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import seal, structure_check
-from stiffdice.io.structure_check import Contents
+from stiffdice.io.structure_check import Contents, Variable
 
 
 @contextmanager
@@ -23,9 +23,7 @@ def opened(path: str | Path) -> Iterator[tuple[h5py.File, Contents]]:
     about = place.stat()
     if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
         raise InputError("is not a regular file")  # a pipe would be waited for
-    sealed = seal.is_sealed(place)
-    if sealed:
-        seal.check(place)
+    sealed = seal.check(place)
     with h5py.File(place, "r") as file:
         structure_check.check_version(file, sealed)
         yield file, structure_check.check(file, about.st_size)
@@ -47,16 +45,14 @@ def told(path: str | Path) -> Iterator[None]:
         raise RefusedError(f"{path}: not a readable HDF5 file ({reason})") from None
 
 
-def check_values(contents: Contents, name: str, values: np.ndarray[Any, Any]) -> None:
+def check_values(name: str, variable: Variable, values: np.ndarray[Any, Any]) -> None:
     """Raise RefusedError at a coordinate that is not finite, and at an enum's value that has no word.
 
     Results may well be NaN or infinite: runs blow up.
     """
-    if not values.size:
-        return
-    if name in contents.coordinates and values.dtype.kind == "f" and not np.isfinite(values).all():
+    if variable.is_coordinate and values.dtype.kind == "f" and not np.isfinite(values).all():
         raise RefusedError(f"{name}: a coordinate that is not finite")
-    count = contents.meanings.get(name)
-    if count is not None and not (values.min() >= 0 and values.max() < count):
-        wrong = values[(values < 0) | (values >= count)].flat[0]
-        raise RefusedError(f"{name} = {wrong}: allowed is 0 to {count - 1}, which have a word in flag_meanings")
+    if variable.words and (wrong := values[(values < 0) | (values >= variable.words)]).size:
+        raise RefusedError(
+            f"{name} = {wrong.flat[0]}: allowed is 0 to {variable.words - 1}, which have a word in flag_meanings"
+        )

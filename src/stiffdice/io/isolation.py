@@ -2,8 +2,8 @@
 
 A renewed seal makes any damage look sound, and the HDF5 library may crash, hang or fill the memory on a file that was
 made to. So a child opens it first, with all checks, reads every value, and answers; a file that ends the child is
-refused. The pipeline reads its own results without it. Run as `python -P -m stiffdice.io.isolation`, the child reads
-paths, each ended by a zero byte, and answers each with a line of JSON: what is wrong, or null.
+refused. The pipeline reads its own results without it. Run as `python -P -m stiffdice.io.isolation`, the child reads a
+list of paths as JSON, and answers each with a line of JSON: what is wrong, or null.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import h5py
@@ -33,19 +33,16 @@ _KINDS = {kind.__name__: kind for kind in (InputError, RefusedError)}
 def refused(paths: Iterable[str | Path]) -> dict[str, InputError]:
     """Return what is wrong with each file that cannot be trusted, by its path; nothing for those that are sound.
 
-    One child for all of them; it is started again where a file ends it. Every error names its file. Raises InputError
-    if no child can be started.
+    One child for all of them; another goes on where a file ends it. Every error names its file. Raises InputError if
+    no child can be started.
     """
-    wrong: dict[str, InputError] = {}
-    with contextlib.ExitStack() as stack:
-        child: Child | None = None
-        for path in map(str, paths):
-            child = child or stack.enter_context(Child())
-            error = child.answer(path)
-            if error is not None:
-                wrong[path] = error
-            if child.is_gone:
-                child = None
+    wrong, due = dict[str, InputError](), [str(path) for path in paths]
+    while due:
+        answers, _ = tried(due)
+        wrong |= {path: _KINDS[found[0]](found[1]) for path, found in zip(due, answers, strict=False) if found}
+        for path in due[len(answers) : len(answers) + 1]:
+            wrong[path] = RefusedError(f"{path}: the HDF5 library fails on it: it crashes, or takes over {SECONDS} s")
+        due = due[len(answers) + 1 :]
     return wrong
 
 
@@ -55,69 +52,32 @@ def admit(*paths: str | Path) -> None:
         raise error
 
 
-class Child:
-    """A process that tries files, one after another."""
-
-    def __enter__(self) -> Child:
-        # -P: what lies about in the folder of the files is not imported.
-        command = [sys.executable, "-P", "-m", "stiffdice.io.isolation"]
-        pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-        # The child runs the same code, wherever this is; and BLAS, which is not needed, reserves no memory for threads.
-        ours = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = os.environ | {"PYTHONPATH": ours, "OPENBLAS_NUM_THREADS": "1"}
-        try:
-            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, env=environment)
-        except OSError as error:
-            raise InputError(f"cannot start a process to try files in: {error.strerror}") from None
-        if self._line() != b"ready\n":
-            self.__exit__()
-            raise InputError("cannot start a process to try files in: it ended at once")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        assert self._process.stdin is not None and self._process.stdout is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
-        self._process.kill()
-        self._process.wait()
-        self._process.stdout.close()
-
-    @property
-    def is_gone(self) -> bool:
-        """Whether a file has ended it."""
-        return self._process.poll() is not None
-
-    def answer(self, path: str) -> InputError | None:
-        """Return what is wrong with a file, none if nothing is."""
-        assert self._process.stdin is not None
-        if "\0" in path:
-            return InputError(f"{path!r}: no file has such a name")
-        try:
-            self._process.stdin.write(os.fsencode(path) + b"\0")
-            self._process.stdin.flush()
-            found = json.loads(self._line())
-        except (OSError, ValueError):
-            self._process.kill()
-            self._process.wait()
-            return RefusedError(f"{path}: the HDF5 library fails on it: it crashes, or takes over {SECONDS} s")
-        return None if found is None else _KINDS[found[0]](found[1])
-
-    def _line(self) -> bytes:
-        assert self._process.stdout is not None
-        watch = threading.Timer(SECONDS * PATIENCE, self._process.kill)
-        watch.start()
-        try:
-            return self._process.stdout.readline()
-        finally:
-            watch.cancel()
+def tried(paths: Sequence[str]) -> tuple[list[list[str] | None], int]:
+    """Return a child's answers on some files, up to the one that ended it, and its exit status."""
+    # -P: what lies about in the folder of the files is not imported.
+    command = [sys.executable, "-P", "-m", "stiffdice.io.isolation"]
+    # The child runs the same code, wherever this is; and BLAS, which is not needed, reserves no memory for threads.
+    ours = os.pathsep.join([str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = os.environ | {"PYTHONPATH": ours, "OPENBLAS_NUM_THREADS": "1"}
+    pipe, asked = subprocess.PIPE, json.dumps(paths).encode()
+    try:
+        child = subprocess.run(
+            command, input=asked, stdout=pipe, stderr=subprocess.DEVNULL, env=environment, check=False
+        )
+    except OSError as error:
+        raise InputError(f"cannot start a process to try files in: {error.strerror}") from None
+    ready, *answers = child.stdout.split(b"\n")[:-1] or [b""]
+    if ready != b"ready":
+        raise InputError("cannot start a process to try files in: it ended at once")
+    return [json.loads(answer) for answer in answers], child.returncode
 
 
 def _read_all(path: str) -> None:
     """Read every value of a file, a piece at a time; raises InputError, naming the file, if it cannot be trusted."""
     with told(path), opened(path) as (file, contents):
-        for name in contents.sizes:
+        for name, variable in contents.variables.items():
             for piece in _pieces(file[name]):
-                check_values(contents, name, piece)
+                check_values(name, variable, piece)
 
 
 def _pieces(dataset: h5py.Dataset) -> Iterator[np.ndarray]:
@@ -132,8 +92,9 @@ def _limit(seconds: int) -> None:
     """Let this process have so many more seconds of processor time, and no more than its share of memory."""
     try:
         import resource
-    except ImportError:  # not everywhere; the parent's patience ends, too
+    except ImportError:  # not everywhere
         return
+    signal.alarm(seconds * PATIENCE)
     used = resource.getrusage(resource.RUSAGE_SELF)
     end = int(used.ru_utime + used.ru_stime) + 1 + seconds
     for kind, most in ((resource.RLIMIT_CPU, end), (resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CORE, 0)):
@@ -144,7 +105,7 @@ def _limit(seconds: int) -> None:
 
 def _serve() -> None:
     print("ready", flush=True)
-    for path in _asked():
+    for path in json.load(sys.stdin):
         _limit(SECONDS)
         answer = None
         try:
@@ -152,14 +113,6 @@ def _serve() -> None:
         except InputError as error:
             answer = [type(error).__name__, str(error)]
         print(json.dumps(answer), flush=True)
-
-
-def _asked() -> Iterator[str]:
-    """Yield the paths that the parent asks for, one at a time."""
-    left = b""
-    while more := os.read(sys.stdin.fileno(), 1 << 16):
-        *paths, left = (left + more).split(b"\0")
-        yield from map(os.fsdecode, paths)
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from os import PathLike
@@ -31,11 +29,13 @@ def open_file(path: str | Path) -> xr.Dataset:
     What is not ours is refused before a value is read (`io.structure_check`), damage by its seal. A file from elsewhere
     is to be tried in another process before (`io.isolation`).
     """
+    import psutil
+
     with told(path), opened(path) as (file, contents):
-        size, memory = sum(contents.sizes.values()), _memory()
+        size, memory = sum(variable.size for variable in contents.variables.values()), psutil.virtual_memory().total
         if size > memory:
             raise InputError(f"holds {size / 1e9:.3g} GB: this machine has {memory / 1e9:.3g} GB of memory")
-        return _dataset(contents, {name: _values(file, contents, name) for name in contents.sizes})
+        return _dataset(contents, {name: _values(file, contents, name) for name in contents.variables})
 
 
 def open_results(path: str | PathLike[str]) -> xr.Dataset:
@@ -60,29 +60,24 @@ def parts(path: str | Path, cells: int | None = None) -> Iterator[xr.Dataset]:
     with ExitStack() as stack:
         with told(path):
             file, contents = stack.enter_context(opened(path))
-            sizes = _sizes(file, contents)
-            if "cell" not in sizes:
+            growing = {name for name, variable in contents.variables.items() if "cell" in variable.dimensions}
+            if not growing:
                 raise RefusedError(f"{path}: has no dimension cell; not a file of runs")
-            others = {
-                name: _values(file, contents, name)
-                for name, dimensions in contents.dimensions.items()
-                if "cell" not in dimensions
-            }
+            others = {name: _values(file, contents, name) for name in contents.variables.keys() - growing}
+        sizes = _sizes(file, contents)
         count = cells or _cells_at_once(file, contents, sizes.get("member", 1))
         for first in range(0, sizes["cell"], count):
             with told(path):
-                some = {
-                    name: others[name] if name in others else _values(file, contents, name, first, first + count)
-                    for name in contents.dimensions
-                }
-                part = _dataset(contents, some)
+                part = _dataset(
+                    contents, others | {k: _values(file, contents, k, first, first + count) for k in growing}
+                )
             yield part
 
 
 def head(path: str | Path, names: Sequence[str]) -> tuple[Mapping[str, Any], dict[str, npt.NDArray[Any]]]:
     """Return the attributes of a file of ours, and some of its variables; raises InputError as `open_file` does."""
     with told(path), opened(path) as (file, contents):
-        return contents.attributes[""], {name: _values(file, contents, name) for name in names}
+        return contents.attributes, {name: _values(file, contents, name) for name in names}
 
 
 def some(path: str | Path, cells: Sequence[int], members: slice) -> dict[str, npt.NDArray[Any]]:
@@ -95,55 +90,43 @@ def some(path: str | Path, cells: Sequence[int], members: slice) -> dict[str, np
     with told(path), opened(path) as (file, contents):
         return {
             name: _values(file, contents, name, first, cells[-1] + 1)[rows, members]
-            for name, dimensions in contents.dimensions.items()
-            if dimensions[:2] == ("cell", "member")
+            for name, variable in contents.variables.items()
+            if variable.dimensions[:2] == ("cell", "member")
         }
 
 
 def _cells_at_once(file: h5py.File, contents: Contents, members: int) -> int:
     """Return how many cells to read at a time: whole chunks, so that none is unpacked twice."""
     chunks = (
-        file[name].chunks[dimensions.index("cell")]
-        for name, dimensions in contents.dimensions.items()
-        if {"cell", "member"} <= set(dimensions) and file[name].chunks
+        file[name].chunks[variable.dimensions.index("cell")]
+        for name, variable in contents.variables.items()
+        if {"cell", "member"} <= set(variable.dimensions) and file[name].chunks
     )
     together = max(chunks, default=1)
     return together * max(1, RUNS_AT_ONCE // (together * max(1, members)))
 
 
-def _memory() -> float:
-    """Return how many bytes of memory this machine has; no bound where it does not say."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return math.inf
-
-
 def _sizes(file: h5py.File, contents: Contents) -> dict[str, int]:
     return {
         dimension: size
-        for name, dimensions in contents.dimensions.items()
-        for dimension, size in zip(dimensions, file[name].shape, strict=True)
+        for name, variable in contents.variables.items()
+        for dimension, size in zip(variable.dimensions, file[name].shape, strict=True)
     }
 
 
 def _values(file: h5py.File, contents: Contents, name: str, first: int = 0, end: int | None = None) -> np.ndarray:
     """Return a variable's values, of some cells if it has cells; raises RefusedError at what no file of ours holds."""
-    cells = slice(first, end)
-    place = tuple(cells if dimension == "cell" else slice(None) for dimension in contents.dimensions[name])
+    variable = contents.variables[name]
+    place = tuple(slice(first, end) if dimension == "cell" else slice(None) for dimension in variable.dimensions)
     found = np.asarray(file[name][place])
     found = found.astype(found.dtype.newbyteorder("="), copy=False)
-    check_values(contents, name, found)
+    check_values(name, variable, found)
     return found
 
 
-def _dataset(contents: Contents, found: dict[str, np.ndarray]) -> xr.Dataset:
+def _dataset(contents: Contents, found: Mapping[str, np.ndarray]) -> xr.Dataset:
     """Return checked values as what their file says they are."""
-    variables = {
-        name: xr.Variable(contents.dimensions[name], array, contents.attributes[name]) for name, array in found.items()
-    }
-    return xr.Dataset(
-        {name: variable for name, variable in variables.items() if name not in contents.coordinates},
-        {name: variable for name, variable in variables.items() if name in contents.coordinates},
-        contents.attributes[""],
-    )
+    known = {name: variable for name, variable in contents.variables.items() if name in found}
+    made = {name: xr.Variable(part.dimensions, found[name], part.attributes) for name, part in known.items()}
+    coordinates = {name: made.pop(name) for name, part in known.items() if part.is_coordinate}
+    return xr.Dataset(made, coordinates, contents.attributes)

@@ -22,11 +22,11 @@ COORDINATE, ENUM, LABELS = "coordinate", "enum", "coordinate, enum"
 
 
 class Attribute(NamedTuple):
-    """A global attribute. type: TEXT, WHOLE or NUMBER. what: it says, for docs/FORMAT.md."""
+    """A global attribute. what: it says, for docs/FORMAT.md. type: TEXT, WHOLE or NUMBER."""
 
-    type: str
     what: str
     need: str = REQUIRED
+    type: str = TEXT
 
 
 class Variable(NamedTuple):
@@ -36,9 +36,9 @@ class Variable(NamedTuple):
     """
 
     dimensions: tuple[str, ...]
-    type: str
     long_name: str
     units: str = "1"
+    type: str = "f8"
     role: str = ""
     note: str = ""
     need: str = REQUIRED
@@ -53,65 +53,53 @@ class Kind(NamedTuple):
 
 
 ATTRIBUTES = {
-    "Conventions": Attribute(TEXT, "`CF-1.11`"),
-    "title": Attribute(TEXT, "of what, in words"),
-    "format_version": Attribute(TEXT, f"of this page: `{FORMAT_VERSION}`"),
-    "kind": Attribute(TEXT, "`run`, `shard`, `sweep`, `frontier`, `experiment`, `timing` or `bench`"),
-    "stiffdice_version": Attribute(TEXT, "of the package that wrote it"),
-    "libraries": Attribute(
-        TEXT, "versions of NumPy, numba, LLVM, h5py, h5netcdf, xarray: `name version; name version`"
-    ),
-    "code_digest": Attribute(
-        TEXT, "SHA-256 of the source that the numbers depend on (each module named and all it imports)"
-    ),
-    "scene": Attribute(TEXT, "the physical problem, as JSON: every key, defaults resolved"),
-    "scene_digest": Attribute(TEXT, "SHA-256 of the scene's canonical JSON (keys sorted, no blanks)"),
+    "Conventions": Attribute("`CF-1.11`"),
+    "title": Attribute("of what, in words"),
+    "format_version": Attribute(f"of this page: `{FORMAT_VERSION}`"),
+    "kind": Attribute("`run`, `shard`, `sweep`, `frontier`, `experiment`, `timing` or `bench`"),
+    "stiffdice_version": Attribute("of the package that wrote it"),
+    "libraries": Attribute("versions of NumPy, numba, LLVM, h5py, h5netcdf, xarray: `name version; name version`"),
+    "code_digest": Attribute("SHA-256 of the source that the numbers depend on: modules named, all they import"),
+    "scene": Attribute("the physical problem, as JSON: every key, defaults resolved"),
+    "scene_digest": Attribute("SHA-256 of the scene's canonical JSON (keys sorted, no blanks)"),
     "config": Attribute(
-        TEXT,
-        "the request, as JSON: model, scheme, steps, members, seed, grid, ... and for experiments the options given",
+        "the request, as JSON: model, scheme, steps, members, seed, grid, …; of experiments the options"
     ),
-    "config_digest": Attribute(TEXT, "SHA-256 of that text"),
-    "model": Attribute(TEXT, "`vertical`, `sliding`, `tumbling`, `flying`; in experiments also `case` or `all`"),
-    "scheme": Attribute(TEXT, "the time-stepping scheme; of an outside engine, its own"),
-    "formula": Attribute(TEXT, "contact law and one step of the scheme, as formulas"),
-    "history": Attribute(TEXT, "by which version it was made; no time", RECOMMENDED),
-    "source": Attribute(TEXT, "how: CF's word for it", RECOMMENDED),
-    "references": Attribute(TEXT, "what it is about", RECOMMENDED),
+    "config_digest": Attribute("SHA-256 of that text"),
+    "model": Attribute("`vertical`, `sliding`, `tumbling`, `flying`; in experiments also `case` or `all`"),
+    "scheme": Attribute("the time-stepping scheme; of an outside engine, its own"),
+    "formula": Attribute("contact law and one step of the scheme, as formulas"),
+    "history": Attribute("by which version it was made; no time", RECOMMENDED),
+    "source": Attribute("how: CF's word for it", RECOMMENDED),
+    "references": Attribute("what it is about", RECOMMENDED),
 }
 
 _SIMULATOR = {
-    "simulator": Attribute(TEXT, "`stiffdice`, or the engine"),
-    "simulator_version": Attribute(TEXT, "its name and version"),
-    "model_reason": Attribute(TEXT, "why this model, where `auto` was requested", RECOMMENDED),
+    "simulator": Attribute("`stiffdice`, or the engine"),
+    "simulator_version": Attribute("its name and version"),
+    "model_reason": Attribute("why this model, where `auto` was requested", RECOMMENDED),
 }
 _CRITERIA = "criteria of the run, `name: measure <= limit; ...`"
-_HOP_HEIGHT = Attribute(
-    NUMBER,
-    "height that a rebound must reach to be judged by `apex`, in the unit of `hop_height_units` (m)",
-    RECOMMENDED,
-)
+_HOP_HEIGHT = Attribute("lowest rebound that `apex` judges, in the unit of `hop_height_units` (m)", RECOMMENDED, NUMBER)
 _OF_RUNS = {
     **_SIMULATOR,
-    "seed": Attribute(WHOLE, "of the jitter of the scan"),
-    "early_stop": Attribute(WHOLE, "1 if a run ends once all criteria are decided, else 0"),
-    "scene_note": Attribute(TEXT, "says that contact law and stiffness are the cell's", RECOMMENDED),
-    "criteria": Attribute(TEXT, f"{_CRITERIA}; only where runs stop early", OPTIONAL),
-    "horizon": Attribute(NUMBER, "until when `trajectory` compares, in the unit of `horizon_units` (s)", OPTIONAL),
+    "seed": Attribute("of the jitter of the scan", type=WHOLE),
+    "early_stop": Attribute("1 if a run ends once all criteria are decided, else 0", type=WHOLE),
+    "scene_note": Attribute("says that contact law and stiffness are the cell's", RECOMMENDED),
+    "criteria": Attribute(f"{_CRITERIA}; only where runs stop early", OPTIONAL),
+    "horizon": Attribute("until when `trajectory` compares, in the unit of `horizon_units` (s)", OPTIONAL, NUMBER),
     "hop_height": _HOP_HEIGHT,
 }
 _JUDGED = {
-    "members": Attribute(WHOLE, "number of members of a cell"),
-    "runs_digest": Attribute(
-        TEXT, "SHA-256 of all runs of the sweep, however they are dealt to shards (`io/content_digest.py`)"
-    ),
-    "judging_code_digest": Attribute(TEXT, "SHA-256 of the source that judged"),
+    "members": Attribute("number of members of a cell", type=WHOLE),
+    "runs_digest": Attribute("SHA-256 of all runs, however they are dealt to shards (`io/content_digest.py`)"),
+    "judging_code_digest": Attribute("SHA-256 of the source that judged"),
 }
 _MACHINE = {
     "machine_processor": Attribute(
-        TEXT,
-        "what the times were taken on; with `machine_cores`, `machine_system`, `machine_load_1_minute`, `versions`",
+        "what the times were taken on; with `machine_cores`, `machine_system`, `machine_load_1_minute`, `versions`"
     ),
-    "measured_at": Attribute(TEXT, "when, UTC"),
+    "measured_at": Attribute("when, UTC"),
 }
 
 _TIME, _PLACE, _RUN, _CELL = ("time",), ("time", "axis"), ("cell", "member"), ("cell",)
@@ -119,83 +107,82 @@ _EDGES, _FIT = ("contact", "criterion", "stiffness"), ("contact", "criterion", "
 _SCAN = ("criterion", "cell")
 
 _CELLS = {
-    "contact": Variable(_CELL, "i1", "contact law", role=LABELS),
-    "stiffness": Variable(_CELL, "f8", "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
-    "steps": Variable(_CELL, "i8", "number of time steps", role=COORDINATE),
-    "omega_h": Variable(_CELL, "f8", "contact frequency of a flat landing times step size", role=COORDINATE),
+    "contact": Variable(_CELL, "contact law", type="i1", role=LABELS),
+    "stiffness": Variable(_CELL, "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
+    "steps": Variable(_CELL, "number of time steps", type="i8", role=COORDINATE),
+    "omega_h": Variable(_CELL, "contact frequency of a flat landing times step size", role=COORDINATE),
 }
-_CRITERION = Variable(("criterion",), "i1", "criterion", role=LABELS)
-_TOLERANCE = Variable(("criterion",), "f8", "tolerance of the criterion")
+_CRITERION = Variable(("criterion",), "criterion", type="i1", role=LABELS)
+_TOLERANCE = Variable(("criterion",), "tolerance of the criterion")
 
 # Of a run, in its own file without dimensions. The long_name of a measure is its criterion's.
 _OUTCOME = {
-    "touchdown_phase": Variable(
-        _RUN, "f8", "phase of the first touch-down within its time step", note="NaN if there is none"
-    ),
-    "verdict": Variable(_RUN, "i1", "verdict", role=ENUM, note="the gravest of the criteria broken and of `ending`"),
+    "touchdown_phase": Variable(_RUN, "phase of the first touch-down within its time step", note="NaN if none"),
+    "verdict": Variable(_RUN, "verdict", type="i1", role=ENUM, note="gravest of the criteria broken and `ending`"),
     "ending": Variable(
         _RUN,
-        "i1",
         "how the run ended whatever it was asked, passed if well",
+        type="i1",
         role=ENUM,
         note="a run that did not end well passes no criterion",
         since="1.3",
     ),
-    "steps_done": Variable(_RUN, "i8", "steps done when the run ended"),
+    "steps_done": Variable(_RUN, "steps done when the run ended", type="i8"),
 }
-_OUT_OF_RANGE = Variable(_RUN, "f8", "1 if a number left the range of doubles")
+_OUT_OF_RANGE = Variable(_RUN, "1 if a number left the range of doubles")
 
 _RUN_VARIABLES = {
-    "step": Variable(_TIME, "i8", "number of time steps done"),
-    "position": Variable(_PLACE, "f8", "centre of mass", "m"),
-    "velocity": Variable(_PLACE, "f8", "velocity of it", "m s-1"),
-    "kinetic_energy": Variable(_TIME, "f8", "kinetic energy, of translation and rotation", "J"),
-    "potential_energy": Variable(_TIME, "f8", "potential energy m g z of the centre of mass", "J"),
-    "elastic_energy": Variable(_TIME, "f8", "energy in the ground's springs, S d²/2 per node", "J"),
-    "energy_paper": Variable(_TIME, "f8", "kinetic and potential energy, the paper's total", "J"),
+    "step": Variable(_TIME, "number of time steps done", type="i8"),
+    "position": Variable(_PLACE, "centre of mass", "m"),
+    "velocity": Variable(_PLACE, "velocity of it", "m s-1"),
+    "kinetic_energy": Variable(_TIME, "kinetic energy, of translation and rotation", "J"),
+    "potential_energy": Variable(_TIME, "potential energy m g z of the centre of mass", "J"),
+    "elastic_energy": Variable(_TIME, "energy in the ground's springs, S d²/2 per node", "J"),
+    "energy_paper": Variable(_TIME, "kinetic and potential energy, the paper's total", "J"),
     "mechanical_energy": Variable(
         _TIME,
-        "f8",
         "kinetic, potential and elastic energy, the velocity taken at the time of the place",
         "J",
         need=RECOMMENDED,
     ),
     "angular_momentum": Variable(
-        _PLACE, "f8", "angular momentum about the centre", "kg m2 s-1", note="where the cube turns", need=OPTIONAL
+        _PLACE, "angular momentum about the centre", "kg m2 s-1", note="where the cube turns", need=OPTIONAL
     ),
     "node_offset": Variable(
-        ("time", "node", "axis"), "f8", "node relative to the centre", "m", note="where the cube turns", need=OPTIONAL
+        ("time", "node", "axis"), "node relative to the centre", "m", note="where the cube turns", need=OPTIONAL
     ),
     **{name: part._replace(dimensions=()) for name, part in {"out_of_range": _OUT_OF_RANGE, **_OUTCOME}.items()},
     "touchdown_phase": _OUTCOME["touchdown_phase"]._replace(dimensions=(), need=RECOMMENDED),
-    "evaluations": Variable((), "i8", "evaluations of the force", need=RECOMMENDED),
-    "time": Variable(_TIME, "f8", "time since the launch", "s", role=COORDINATE),
-    "axis": Variable(("axis",), "i1", "Cartesian axis, z up", role=LABELS, note="x, y, z"),
-    "node": Variable(("node",), "i1", "node, numbered as in cube.m", role=COORDINATE, note="1 to 8", need=OPTIONAL),
+    "evaluations": Variable((), "evaluations of the force", type="i8", need=RECOMMENDED),
+    "time": Variable(_TIME, "time since the launch", "s", role=COORDINATE),
+    "axis": Variable(("axis",), "Cartesian axis, z up", type="i1", role=LABELS, note="x, y, z"),
+    "node": Variable(
+        ("node",), "node, numbered as in cube.m", type="i1", role=COORDINATE, note="1 to 8", need=OPTIONAL
+    ),
 }
 
 _FRONTIER_VARIABLES = {
-    "first_pass": Variable(_EDGES, "f8", "fewest steps at which every member passes", note="NaN if none"),
-    "last_fail": Variable(_EDGES, "f8", "most steps at which a member still fails", note="NaN if none"),
-    "steps_needed": Variable(
-        _EDGES, "f8", "fewest scanned steps from which on every member passes", note="NaN if none"
-    ),
-    "flips": Variable(_EDGES, "f8", "changes between pass and fail along the scan"),
-    "limit": Variable(("stiffness",), "f8", "steps at the linear stability limit, omega h = 2"),
-    "pass_fraction": Variable(_SCAN, "f8", "share of a cell's members that pass the criterion"),
-    "pass_fraction_low": Variable(_SCAN, "f8", "lower end of its 95 % confidence interval", note="Wilson's"),
-    "pass_fraction_high": Variable(_SCAN, "f8", "upper end of its 95 % confidence interval"),
+    "first_pass": Variable(_EDGES, "fewest steps at which every member passes", note="NaN if none"),
+    "last_fail": Variable(_EDGES, "most steps at which a member still fails", note="NaN if none"),
+    "steps_needed": Variable(_EDGES, "fewest scanned steps from which on every member passes", note="NaN if none"),
+    "flips": Variable(_EDGES, "changes between pass and fail along the scan"),
+    "limit": Variable(("stiffness",), "steps at the linear stability limit, omega h = 2"),
+    "pass_fraction": Variable(_SCAN, "share of a cell's members that pass the criterion"),
+    "pass_fraction_low": Variable(_SCAN, "lower end of its 95 % confidence interval", note="Wilson's"),
+    "pass_fraction_high": Variable(_SCAN, "upper end of its 95 % confidence interval"),
     "tolerance": _TOLERANCE,
-    "exponent": Variable(_FIT, "f8", "exponent of the power law", note="NaN with fewer than three points"),
-    "exponent_error": Variable(_FIT, "f8", "standard error of it"),
-    "factor": Variable(_FIT, "f8", "steps at stiffness 1 kg s-2 by the power law"),
-    "scatter": Variable(_FIT, "f8", "standard deviation of log10 of the steps about the power law"),
-    "centre": Variable(_FIT, "f8", "geometric mean of the stiffnesses in the fit", "kg s-2"),
-    "points": Variable(_FIT, "f8", "number of stiffnesses in the fit"),
-    "contact": Variable(("contact",), "i1", "contact law", role=LABELS),
+    "exponent": Variable(_FIT, "exponent of the power law", note="NaN with fewer than three points"),
+    "exponent_error": Variable(_FIT, "standard error of it"),
+    "factor": Variable(_FIT, "steps at stiffness 1 kg s-2 by the power law"),
+    "scatter": Variable(_FIT, "standard deviation of log10 of the steps about the power law"),
+    "centre": Variable(_FIT, "geometric mean of the stiffnesses in the fit", "kg s-2"),
+    "points": Variable(_FIT, "number of stiffnesses in the fit"),
+    "contact": Variable(("contact",), "contact law", type="i1", role=LABELS),
     "criterion": _CRITERION,
-    "edge": Variable(("edge",), "i1", "edge of a criterion", role=LABELS, note="first_pass, last_fail, steps_needed"),
-    "stiffness": Variable(("stiffness",), "f8", "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
+    "edge": Variable(
+        ("edge",), "edge of a criterion", type="i1", role=LABELS, note="first_pass, last_fail, steps_needed"
+    ),
+    "stiffness": Variable(("stiffness",), "ground stiffness", "kg s-2", role=COORDINATE, note="per node"),
     **{f"cell_{name}": part for name, part in _CELLS.items()},
 }
 
@@ -203,14 +190,13 @@ KINDS: dict[str, Kind] = {
     "run": Kind(
         {
             **_SIMULATOR,
-            "steps": Attribute(WHOLE, "number of time steps of the run"),
-            "step_size": Attribute(NUMBER, "duration/steps, in the unit of `step_size_units` (s)"),
-            "omega_h": Attribute(NUMBER, "contact frequency of a flat landing times step size"),
-            "criteria": Attribute(TEXT, _CRITERIA),
-            "tolerance": Attribute(NUMBER, "of the error, for a scheme that controls its own", RECOMMENDED),
+            "steps": Attribute("number of time steps of the run", type=WHOLE),
+            "step_size": Attribute("duration/steps, in the unit of `step_size_units` (s)", type=NUMBER),
+            "omega_h": Attribute("contact frequency of a flat landing times step size", type=NUMBER),
+            "criteria": Attribute(_CRITERIA),
+            "tolerance": Attribute("of the error, for a scheme that controls its own", RECOMMENDED, NUMBER),
             "hop_height": _HOP_HEIGHT,
             "scene_derived": Attribute(
-                TEXT,
                 "values of the scene that were given in other words (a side for a radius, a restitution for a damping),"
                 " and from what; the values themselves are in `scene`",
                 OPTIONAL,
@@ -222,18 +208,18 @@ KINDS: dict[str, Kind] = {
         _OF_RUNS,
         {
             "out_of_range": _OUT_OF_RANGE,
-            "energy_ratio": Variable(_RUN, "f8", "measure of criterion energy"),
-            "apex_ratio": Variable(_RUN, "f8", "measure of criterion apex"),
-            "restitution_error": Variable(_RUN, "f8", "measure of criterion restitution"),
-            "trajectory_error": Variable(_RUN, "f8", "measure of criterion trajectory"),
+            "energy_ratio": Variable(_RUN, "measure of criterion energy"),
+            "apex_ratio": Variable(_RUN, "measure of criterion apex"),
+            "restitution_error": Variable(_RUN, "measure of criterion restitution"),
+            "trajectory_error": Variable(_RUN, "measure of criterion trajectory"),
             **_OUTCOME,
-            "steps_computed": Variable(_RUN, "i8", "steps computed one by one, not many at once"),
+            "steps_computed": Variable(_RUN, "steps computed one by one, not many at once", type="i8"),
             "decided": Variable(
-                (*_RUN, "criterion"), "i8", "step that decided the criterion, 0 if none before the end"
+                (*_RUN, "criterion"), "step that decided the criterion, 0 if none before the end", type="i8"
             ),
             **_CELLS,
             "member": Variable(
-                ("member",), "i4", "member: number k of n is launched k/n of a time step late", role=COORDINATE
+                ("member",), "member: number k of n is launched k/n of a time step late", type="i4", role=COORDINATE
             ),
             "criterion": _CRITERION,
         },
@@ -241,28 +227,24 @@ KINDS: dict[str, Kind] = {
     "sweep": Kind(
         {**_OF_RUNS, **_JUDGED},
         {
-            "failing": Variable(_SCAN, "i4", "number of members that fail the criterion"),
-            "verdicts": Variable(("cell", "verdict"), "i4", "number of members that ended with a verdict"),
-            "steps_computed": Variable(_CELL, "i8", "steps computed one by one, of all members"),
+            "failing": Variable(_SCAN, "number of members that fail the criterion", type="i4"),
+            "verdicts": Variable(("cell", "verdict"), "number of members that ended with a verdict", type="i4"),
+            "steps_computed": Variable(_CELL, "steps computed one by one, of all members", type="i8"),
             "tolerance": _TOLERANCE,
             **_CELLS,
             "criterion": _CRITERION,
-            "verdict": Variable(("verdict",), "i1", "verdict", role=LABELS),
+            "verdict": Variable(("verdict",), "verdict", type="i1", role=LABELS),
         },
     ),
     "frontier": Kind(
-        {
-            **_OF_RUNS,
-            **_JUDGED,
-            "analysis_code_digest": Attribute(TEXT, "SHA-256 of the source that found the edges"),
-        },
+        {**_OF_RUNS, **_JUDGED, "analysis_code_digest": Attribute("SHA-256 of the source that found the edges")},
         _FRONTIER_VARIABLES,
     ),
     "experiment": Kind({}, {}),
     "timing": Kind(_MACHINE, {}),
     "bench": Kind(
-        {**_MACHINE, "bench_code_digest": Attribute(TEXT, "SHA-256 of the benchmarks' source")},
-        {"round": Variable(("round",), "i4", "round, in which the cases take turns", role=COORDINATE)},
+        {**_MACHINE, "bench_code_digest": Attribute("SHA-256 of the benchmarks' source")},
+        {"round": Variable(("round",), "round, in which the cases take turns", type="i4", role=COORDINATE)},
     ),
 }
 
@@ -305,11 +287,14 @@ def problems(dataset: xr.Dataset) -> list[str]:
     kind = dataset.attrs.get("kind")
     if kind not in KINDS:
         return [f"attribute kind = {kind}: allowed is {' or '.join(KINDS)}"]
-    return [
+    wrong = [
         *_wrong_attributes(dataset, {**ATTRIBUTES, **KINDS[kind].attributes}),
         *_wrong_variables(dataset, KINDS[kind].variables, version),
-        *_wrong_config(dataset),
     ]
+    text = dataset.attrs.get("config")
+    if isinstance(text, str) and hashlib.sha256(text.encode()).hexdigest() != dataset.attrs.get("config_digest"):
+        wrong.append("attribute config is not that of config_digest")
+    return wrong
 
 
 def _numbers(version: str) -> tuple[int, ...]:
@@ -340,19 +325,10 @@ def _wrong_variables(dataset: xr.Dataset, known: Mapping[str, Variable], version
                 yield f"variable {name} is missing"
             continue
         found = dataset[name]
-        if found.dims != variable.dimensions:
-            yield f"{name} has dimensions ({_listed(found.dims)}): allowed are ({_listed(variable.dimensions)})"
-        if found.dtype.str[1:] != variable.type:
-            yield f"{name} is of type {found.dtype.str[1:]}: allowed is {variable.type}"
-        if found.attrs.get("units") != variable.units:
-            yield f"{name} has units {found.attrs.get('units')}: allowed is {variable.units}"
-
-
-def _listed(names: tuple[Any, ...]) -> str:
-    return ", ".join(map(str, names))
-
-
-def _wrong_config(dataset: xr.Dataset) -> Iterator[str]:
-    text = dataset.attrs.get("config")
-    if isinstance(text, str) and hashlib.sha256(text.encode()).hexdigest() != dataset.attrs.get("config_digest"):
-        yield "attribute config is not that of config_digest"
+        for what, theirs, ours in (
+            ("dimensions", " ".join(map(str, found.dims)), " ".join(variable.dimensions)),
+            ("type", found.dtype.str[1:], variable.type),
+            ("units", found.attrs.get("units"), variable.units),
+        ):
+            if ours != theirs:
+                yield f"{name} has {what} {theirs}: allowed is {ours}"

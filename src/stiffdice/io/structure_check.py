@@ -11,7 +11,7 @@ import json
 import math
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import h5py
@@ -44,7 +44,7 @@ _FILTERS = {
 
 # Which dimensions a variable has, and which variables a dimension: references, read apart or not at all.
 _REFERENCES = ("DIMENSION_LIST", "REFERENCE_LIST")
-# What netCDF-4 keeps for itself, and which variables are coordinates, which `Contents` holds apart.
+# What netCDF-4 keeps for itself, and which variables are coordinates.
 _ITS_OWN = frozenset(
     ("CLASS", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates", "coordinates", "_NCProperties", "_nc3_strict")
 )
@@ -54,36 +54,27 @@ _BARE = "This is a netCDF dimension but not a netCDF variable"
 _CHANGING = ("_FillValue", "missing_value", "scale_factor", "add_offset", "_Unsigned", "_Encoding", "dtype")
 
 
-class Contents(NamedTuple):
-    """What a checked file holds; dimensions that have no values of their own are no variables.
+class Variable(NamedTuple):
+    """A variable of a checked file: names of its axes, bytes of its values, its attributes.
 
-    coordinates: the names of the variables that say where the others are. meanings: how many values an enum may have,
-    by its name. sizes: bytes of a variable, by its name. dimensions: names of its axes, by its name. attributes: those
-    of a variable by its name, those of the file itself by "", without what netCDF-4 keeps for itself.
+    words: how many values it may have as an enum, 0 of what is none. is_coordinate: whether it says where others are.
     """
 
-    coordinates: frozenset[str]
-    meanings: Mapping[str, int]
-    sizes: Mapping[str, int]
-    dimensions: Mapping[str, tuple[str, ...]]
-    attributes: Mapping[str, Mapping[str, Any]]
+    dimensions: tuple[str, ...]
+    size: int
+    words: int
+    is_coordinate: bool
+    attributes: Mapping[str, Any]
 
 
-class _Item(NamedTuple):
-    """A dataset and its attributes."""
+class Contents(NamedTuple):
+    """What a checked file holds: its attributes without what netCDF-4 keeps for itself, and its variables by name.
 
-    dataset: h5py.Dataset
-    about: Mapping[str, Any]
+    Dimensions that have no values of their own are no variables.
+    """
 
-    @property
-    def is_scale(self) -> bool:
-        """Whether it is a dimension: with its values, or bare."""
-        return self.about.get("CLASS") == "DIMENSION_SCALE"
-
-    @property
-    def is_bare(self) -> bool:
-        """Whether it only stands for a dimension and has no values."""
-        return self.is_scale and _BARE in str(self.about.get("NAME"))
+    attributes: Mapping[str, Any]
+    variables: Mapping[str, Variable]
 
 
 def check_version(file: h5py.File, sealed: bool) -> None:
@@ -106,25 +97,28 @@ def check(file: h5py.File, length: int) -> Contents:
     """Return what an open file of so many bytes holds; raises RefusedError naming the variable if it is not ours."""
     about = _attributes("the file", file)
     _check_scene(about)
-    items = {name: _Item(dataset, _attributes(name, dataset)) for name, dataset in _datasets(file)}
-    variables = {name: item for name, item in items.items() if not item.is_bare}
-    sizes = {name: math.prod(item.dataset.shape) * item.dataset.dtype.itemsize for name, item in variables.items()}
+    datasets = dict(_datasets(file))
+    told = {name: _attributes(name, dataset) for name, dataset in datasets.items()}
+    scales = {name for name, own in told.items() if own.get("CLASS") == "DIMENSION_SCALE"}
+    names = [name for name in datasets if name not in scales or _BARE not in str(told[name].get("NAME"))]
+    sizes = {name: math.prod(datasets[name].shape) * datasets[name].dtype.itemsize for name in names}
     total, most = sum(sizes.values()), max(ALWAYS_ALLOWED, MOST_RATIO * length)
     if total > most:
-        told = " MB in a file of ".join(f"{size / 1e6:.4g}" for size in (total, length))
-        raise RefusedError(f"holds {told} MB: allowed are {most / 1e6:.4g} MB")
-    dimensions = _dimensions(file, items)
-    coordinates = {name for name, item in variables.items() if item.is_scale}
-    for named in (about, *(item.about for item in variables.values())):
-        coordinates.update(word for word in str(named.get("coordinates", "")).split() if word in variables)
-    meanings = {name: _meanings(name, item) for name, item in variables.items()}
-    return Contents(
-        frozenset(coordinates),
-        {name: count for name, count in meanings.items() if count},
-        sizes,
-        {name: dimensions[name] for name in variables},
-        {"": _public(about), **{name: _public(item.about) for name, item in variables.items()}},
-    )
+        share = " MB in a file of ".join(f"{size / 1e6:.4g}" for size in (total, length))
+        raise RefusedError(f"holds {share} MB: allowed are {most / 1e6:.4g} MB")
+    dimensions = _dimensions(file, datasets, scales)
+    listed = {word for own in (about, *told.values()) for word in str(own.get("coordinates", "")).split()}
+    variables = {
+        name: Variable(
+            dimensions[name],
+            sizes[name],
+            _words(name, datasets[name], told[name]),
+            name in scales | listed,
+            _public(told[name]),
+        )
+        for name in names
+    }
+    return Contents(_public(about), variables)
 
 
 def _datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
@@ -155,26 +149,26 @@ def _is_number(kind: h5py.h5t.TypeID) -> bool:
     return not kind.committed() and any(kind.equal(known) for known in _TYPES)
 
 
-def _dimensions(file: h5py.File, items: Mapping[str, _Item]) -> dict[str, tuple[str, ...]]:
+def _dimensions(
+    file: h5py.File, datasets: Mapping[str, h5py.Dataset], scales: Collection[str]
+) -> dict[str, tuple[str, ...]]:
     """Return the names of the axes; raises RefusedError unless each is a dimension of the file, and as long."""
-    scales = {h5py.h5o.get_info(item.dataset.id).addr: name for name, item in items.items() if item.is_scale}
-    dimensions: dict[str, tuple[str, ...]] = {}
-    for name, item in items.items():
-        if item.is_scale:
-            if item.dataset.ndim != 1:
+    places = {h5py.h5o.get_info(datasets[name].id).addr: name for name in scales}
+    dimensions: dict[str, tuple[str, ...]] = {name: (name,) for name in scales}
+    for name, dataset in datasets.items():
+        if name in scales:
+            if dataset.ndim != 1:
                 raise RefusedError(f"{name}: a dimension has one axis")
-            dimensions[name] = (name,)
             continue
-        places = [
-            h5py.h5o.get_info(h5py.h5r.dereference(reference, file.id)).addr
-            for references in item.dataset.attrs.get("DIMENSION_LIST", ())
+        found = [
+            places.get(h5py.h5o.get_info(h5py.h5r.dereference(reference, file.id)).addr)
+            for references in dataset.attrs.get("DIMENSION_LIST", ())
             for reference in references
         ]
-        found = [scales[place] for place in places if place in scales]
-        shape = [size for scale in found for size in items[scale].dataset.shape]
-        if len(places) != len(set(found)) or shape != list(item.dataset.shape):
+        known = tuple(scale for scale in dict.fromkeys(found) if scale)
+        if len(known) < len(found) or dataset.shape != tuple(size for scale in known for size in datasets[scale].shape):
             raise RefusedError(f"{name}: DIMENSION_LIST: allowed is a dimension of this file for each axis, as long")
-        dimensions[name] = tuple(found)
+        dimensions[name] = known
     return dimensions
 
 
@@ -218,12 +212,11 @@ def _public(about: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value[0] if np.shape(value) == (1,) else value for key, value in found.items()}
 
 
-def _meanings(name: str, item: _Item) -> int:
+def _words(name: str, dataset: h5py.Dataset, about: Mapping[str, Any]) -> int:
     """Return how many values an enum has, 0 of what is none.
 
     Raises RefusedError unless a variable has a name and a unit, and an enum a word for each value.
     """
-    about = item.about
     for key in ("units", "long_name"):
         if not isinstance(about.get(key), str) or not about[key].strip():
             raise RefusedError(f"{name}: has no {key}; every variable of ours has")
@@ -231,7 +224,7 @@ def _meanings(name: str, item: _Item) -> int:
         return 0
     values, words = np.atleast_1d(about.get("flag_values", ())), str(about.get("flag_meanings", "")).split()
     in_order = values.tolist() == list(range(len(words)))
-    if item.dataset.dtype.kind != "i" or not words or len(set(words)) < len(words) or not in_order:
+    if dataset.dtype.kind != "i" or not words or len(set(words)) < len(words) or not in_order:
         raise RefusedError(
             f"{name}: an enum is whole numbers, with flag_values 0, 1, … and a word for each in flag_meanings"
         )

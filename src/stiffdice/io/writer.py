@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -36,24 +36,30 @@ def temporary_of(target: Path) -> Path:
     import psutil
 
     here = host.name()
-    _remove(target, rf"{re.escape(here)}\.([0-9]+)", lambda found: not psutil.pid_exists(int(found[1])))
+    for path, where, process in _unfinished(target):
+        if where == here and not psutil.pid_exists(process):
+            _remove(path)
     return target.with_name(f".{target.name}.{here}.{os.getpid()}.part")
 
 
 def clear(target: Path) -> None:
     """Remove all that is unfinished of a file, of whatever host: for one who knows that nobody else writes it."""
-    _remove(target, r".+\.[0-9]+", lambda _: True)
+    for path, _, _ in _unfinished(target):
+        _remove(path)
 
 
-def _remove(target: Path, writer: str, is_gone: Callable[[re.Match[str]], bool]) -> None:
-    """Remove what is unfinished of a file and names a writer of this pattern, HOST.PID, who is gone."""
-    name = re.compile(rf"\.{re.escape(target.name)}\.{writer}\.part")
+def _unfinished(target: Path) -> Iterator[tuple[Path, str, int]]:
+    """Yield what is unfinished of a file, with the host and the process of its writer."""
+    name = re.compile(rf"\.{re.escape(target.name)}\.(.+)\.([0-9]+)\.part")
     with contextlib.suppress(OSError):  # a folder that cannot be read: whoever writes in it says so
-        for entry in os.scandir(target.parent):
-            found = name.fullmatch(entry.name)
-            if found and is_gone(found):
-                with contextlib.suppress(OSError):
-                    Path(entry).unlink()
+        for path in target.parent.iterdir():
+            if found := name.fullmatch(path.name):
+                yield path, found[1], int(found[2])
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()
 
 
 @contextlib.contextmanager
@@ -69,8 +75,7 @@ def whole(target: Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(f"{target}: {error.strerror}; nothing was stored") from None
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        _remove(temporary)
 
 
 def write_bytes(data: bytes | memoryview, path: str | Path, end: bytes = b"") -> None:

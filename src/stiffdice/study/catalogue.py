@@ -28,6 +28,8 @@ class Entry(NamedTuple):
         return getattr(importlib.import_module(self.module), self.function)
 
 
+_WORK, _TARGETS = "stiffdice.report.figures.work_precision", "stiffdice.report.tables.work_precision"
+
 # (datasets by name, title) -> a figure.
 DRAWINGS: dict[str, Entry] = {
     "cube-start": Entry("stiffdice.report.figures.cube", "start", "runs"),
@@ -48,24 +50,12 @@ DRAWINGS: dict[str, Entry] = {
     "friction-chatter": Entry("stiffdice.report.figures.friction_chatter", "draw", "experiments", "friction-chatter"),
     "model-ablation": Entry("stiffdice.report.figures.model_ablation", "draw", "experiments", "model-ablation"),
     "held-contacts": Entry("stiffdice.report.figures.held_contacts", "draw", "experiments", "held-contacts"),
-    "work-precision": Entry(
-        "stiffdice.report.figures.work_precision", "position", "experiments", "work-precision", timed=True
-    ),
-    "work-restitution": Entry(
-        "stiffdice.report.figures.work_precision", "restitution", "experiments", "work-precision", timed=True
-    ),
-    "work-energy": Entry(
-        "stiffdice.report.figures.work_precision", "energy", "experiments", "work-precision", timed=True
-    ),
-    "cost": Entry(
-        "stiffdice.report.figures.work_precision", "cost_position", "experiments", "work-precision", timed=True
-    ),
-    "cost-restitution": Entry(
-        "stiffdice.report.figures.work_precision", "cost_restitution", "experiments", "work-precision", timed=True
-    ),
-    "cost-energy": Entry(
-        "stiffdice.report.figures.work_precision", "cost_energy", "experiments", "work-precision", timed=True
-    ),
+    "work-precision": Entry(_WORK, "position", "experiments", "work-precision", timed=True),
+    "work-restitution": Entry(_WORK, "restitution", "experiments", "work-precision", timed=True),
+    "work-energy": Entry(_WORK, "energy", "experiments", "work-precision", timed=True),
+    "cost": Entry(_WORK, "cost_position", "experiments", "work-precision", timed=True),
+    "cost-restitution": Entry(_WORK, "cost_restitution", "experiments", "work-precision", timed=True),
+    "cost-energy": Entry(_WORK, "cost_energy", "experiments", "work-precision", timed=True),
     "engine-limits": Entry("stiffdice.report.figures.engines.limits", "draw", "experiments", "engine-limits"),
     "engine-throw": Entry("stiffdice.report.figures.engines.throw", "draw", "experiments", "engine-throw"),
     "engine-speed": Entry("stiffdice.report.figures.engines.speed", "draw", "timings", "engine-speed"),
@@ -77,13 +67,11 @@ TABLES: dict[str, Entry] = {
     "paper-questions": Entry("stiffdice.report.tables.paper_questions", "table", "sweeps"),
     "refinement-check": Entry("stiffdice.report.tables.refinement_check", "table", "sweeps"),
     "precision-limits": Entry("stiffdice.report.tables.precision_limits", "table", "experiments", "precision-limits"),
-    "work-precision": Entry(
-        "stiffdice.report.tables.work_precision", "table", "experiments", "work-precision", timed=True
-    ),
+    "work-precision": Entry(_TARGETS, "table", "experiments", "work-precision", timed=True),
     "engine-contact": Entry("stiffdice.report.tables.engines", "contact", "experiments", "engine-contact"),
     "engine-limits": Entry("stiffdice.report.tables.engines", "limits", "experiments", "engine-limits"),
     "engine-speed": Entry("stiffdice.report.tables.engines", "speed", "timings", "engine-speed"),
-    "targets": Entry("stiffdice.report.tables.work_precision", "targets", "experiments", "work-precision", timed=True),
+    "targets": Entry(_TARGETS, "targets", "experiments", "work-precision", timed=True),
 }
 
 # (scene, **options) -> a dataset; the function's keyword arguments are the options, with their defaults.
@@ -115,12 +103,9 @@ def showing_times(plan: object) -> set[str]:
     """Return which figures and tables of a study, as its file says, show timings: `figures/NAME`, `tables/NAME`."""
     found = set()
     for kind, word, registry in (("figures", "draw", DRAWINGS), ("tables", "tell", TABLES)):
-        entries = plan.get(kind) if isinstance(plan, Mapping) else None
-        for name, entry in entries.items() if isinstance(entries, Mapping) else ():
-            if isinstance(entry, Mapping) and (entry.get("timings") or _draws_times(registry, entry.get(word))):
+        timed = {name for name, entry in registry.items() if entry.given == "timings"}
+        shown = plan.get(kind) if isinstance(plan, Mapping) else None
+        for name, part in shown.items() if isinstance(shown, Mapping) else ():
+            if isinstance(part, Mapping) and (part.get("timings") or str(part.get(word)) in timed):
                 found.add(f"{kind}/{name}")
     return found
-
-
-def _draws_times(registry: Mapping[str, Entry], name: object) -> bool:
-    return isinstance(name, str) and name in registry and registry[name].given == "timings"

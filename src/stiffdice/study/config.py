@@ -53,13 +53,12 @@ class Experiment(NamedTuple):
 
 
 class PlannedFigure(NamedTuple):
-    """One figure: what to draw (a name in the catalogue), of which run, or of which sweeps, experiments or timings.
+    """One figure or table: what to draw (a name in the catalogue), of which run, sweeps, experiments or timings.
 
     timings: those shown besides experiments.
     """
 
     draw: str
-    run: str | None
     of: tuple[str, ...]
     title: str
     timings: tuple[str, ...] = ()
@@ -173,11 +172,10 @@ def _shown(
     """Return figures or tables of what there is, without those that would have nothing to show."""
     shown = {}
     for name, part in planned.items():
-        sources = (part.run,) if part.run is not None else part.of
-        there = tuple(source for source in sources if source in parts[entries[part.draw].given])
+        there = tuple(source for source in part.of if source in parts[entries[part.draw].given])
         timings = tuple(source for source in part.timings if source in parts["timings"])
         if there and bool(timings) == bool(part.timings):
-            shown[name] = part._replace(of=() if part.run is not None else there, timings=timings)
+            shown[name] = part._replace(of=there, timings=timings)
         else:
             left_out.append(f"left out: {kind}.{name}: nothing of what it shows is there")
     return shown
@@ -211,43 +209,40 @@ def _planned_figure(
 ) -> PlannedFigure:
     """Return the plan of a figure or a table; raises InputError unless the study has what it names."""
     word = "draw" if "draw" in part else "tell"
-    of, timings = tuple(part.get("of", ())), tuple(part.get("timings", ()))
-    planned = PlannedFigure(part[word], part.get("run"), of, part["title"], timings)
-    validation.choice(f"{where}.{word}", planned.draw, registry)
-    entry = registry[planned.draw]
-    if entry.given == "runs":
-        if of or timings:
-            raise InputError(f"{where}.{'of' if of else 'timings'}: {planned.draw} draws a run; name it with `run`")
-        _known(f"{where}.run", planned.run, data.get("runs", {}), "runs")
-        return planned
-    if planned.run is not None:
-        raise InputError(f"{where}.run = {planned.run}: {planned.draw} draws {entry.given}; name them with `of`")
-    if not of:
-        raise InputError(f"{where}.of is missing: {planned.draw} needs the names of {entry.given}")
-    if timings and not entry.timed:
-        raise InputError(f"{where}.timings: {planned.draw} shows none")
-    for key, kind, names in (("of", entry.given, of), ("timings", "timings", timings)):
-        for source in names:
-            _known(f"{where}.{key}", source, data.get(kind, {}), kind)
-            if entry.measures and data[kind][source]["measure"] != entry.measures:
-                raise InputError(
-                    f"{where}.{key} = {source}: {planned.draw} shows only {kind} that measure {entry.measures}"
-                )
+    draw = validation.choice(f"{where}.{word}", part[word], registry)
+    entry = registry[draw]
+    takes = {"run": "runs"} if entry.given == "runs" else {"of": entry.given}
+    if entry.timed:
+        takes["timings"] = "timings"
+    for key in ("run", "of", "timings"):
+        if key in part and key not in takes:
+            told = "; ".join(f"name {kind} with `{other}`" for other, kind in takes.items())
+            raise InputError(f"{where}.{key} = {validation.shown(part[key])}: {draw} shows none of these; {told}")
+    planned = PlannedFigure(draw, _names(part.get("run", part.get("of"))), part["title"], _names(part.get("timings")))
+    if not planned.of:
+        raise InputError(f"{where}.{'run' if 'run' in takes else 'of'} is missing: {draw} needs names of {entry.given}")
+    for (key, kind), names in zip(takes.items(), (planned.of, planned.timings), strict=False):
+        for name in names:
+            allowed = data.get(kind, {})
+            if name not in allowed:
+                told = " or ".join(allowed) or f"none: this study has no {kind}"
+                raise InputError(f"{where}.{key} = {name}: allowed is {told}{validation.meant(name, allowed)}")
+            if entry.measures and allowed[name]["measure"] != entry.measures:
+                raise InputError(f"{where}.{key} = {name}: {draw} shows only {kind} that measure {entry.measures}")
     return planned
+
+
+def _names(given: str | Sequence[str] | None) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given or ())
 
 
 def _check_turns(where: str, planned: PlannedFigure, runs: Mapping[str, PlannedRun]) -> None:
     """Raise InputError if a figure shows how a cube turns in a run that has no turning."""
-    run = runs.get(planned.run or "")
-    if run and planned.draw.startswith(("cube", "animation")) and not _models_of(run) <= TURNING:
-        raise InputError(f"{where}.run = {planned.run}: {planned.draw} needs a run of model tumbling")
-
-
-def _known(where: str, name: str | None, names: Mapping[str, Any], kind: str) -> None:
-    """Raise InputError unless there is one such thing in the study."""
-    if name is None or name not in names:
-        allowed = " or ".join(names) or f"none: this study has no {kind}"
-        raise InputError(f"{where} = {validation.shown(name)}: allowed is {allowed}{validation.meant(name, names)}")
+    if not planned.draw.startswith(("cube", "animation")):
+        return
+    for name in planned.of:
+        if name in runs and not _models_of(runs[name]) <= TURNING:
+            raise InputError(f"{where}.run = {name}: {planned.draw} needs a run of model tumbling")
 
 
 def _experiment(
@@ -285,20 +280,20 @@ def _installed_of(methods: Sequence[str], missing: list[NotInstalledError]) -> l
 
 def _same_kind(key: str, value: object, default: Any) -> None:
     """Raise InputError unless an option's value is of the kind that its default is."""
-    if isinstance(default, str):
+    if isinstance(default, tuple):
+        like = default[0] if default else 0.0
+        if not isinstance(value, list) or not value:
+            kind = "words" if isinstance(like, str) else "numbers"
+            raise InputError(f"{key} = {validation.shown(value)}: allowed is a list of {kind}")
+        for part in value:
+            _same_kind(key, part, like)
+    elif isinstance(default, str):
         if not isinstance(value, str):
             raise InputError(f"{key} = {validation.shown(value)}: allowed is a word, as {default}")
     elif isinstance(default, int):
         validation.count(key, value)
-    elif isinstance(default, float):
-        validation.number(key, value, "", at_least=0)
     else:
-        words = isinstance(default, tuple) and isinstance(default[0], str)
-        if not isinstance(value, list) or not value or (words and not all(isinstance(part, str) for part in value)):
-            kind = f"words, as {default[0]}" if words else "numbers"
-            raise InputError(f"{key} = {validation.shown(value)}: allowed is a list of {kind}")
-        for part in [] if words else value:
-            validation.number(key, part, "", at_least=0)
+        validation.number(key, value, "", at_least=0)
 
 
 def _sweep(given_criteria: Mapping[str, float] | None, sweep: Mapping[str, Any], _missing: object) -> Sweep:

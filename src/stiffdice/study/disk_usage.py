@@ -5,79 +5,64 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from stiffdice.study import job_log
 
-# What io.write and io.spool call a file that is not finished: .NAME.HOST.PROCESS.part
+# What io.writer calls a file that is not finished: .NAME.HOST.PROCESS.part
 _PART = re.compile(r"\..+\.(\d{1,10})\.part")
 
-# The folders of results/STUDY; shards are apart, and what is in none of them is `other`.
-KINDS = ("runs", "shards", "sweeps", "experiments", "figures", "tables", "benchmarks", "logs", "other")
+# The folders of results/STUDY; shards and unfinished files are apart, and what is in none of them is `other`.
+_FOLDERS = ("runs", "sweeps", "experiments", "figures", "tables", "benchmarks", "logs")
 
 
-class Unfinished(NamedTuple):
-    """An unfinished file; process: that began it, alive: whether one with its number runs on this host.
+class Use(NamedTuple):
+    """Sizes in bytes: of all files, by kind; and of some by their paths, relative to the folder of the study.
 
-    One that is alive is most likely being written; one that is not was left by a job that was killed, or is written on
-    another host.
+    stale: shards of other grids. leftover: unfinished files of processes that do not run here: jobs that were killed,
+    or that run on another host. damaged: files set aside.
     """
 
-    path: str
-    size: int
-    process: int
-    alive: bool
-
-
-@dataclass(frozen=True)
-class Use:
-    """Sizes in bytes; paths are relative to the folder of the study.
-
-    kinds: of all files but unfinished ones, by kind. planned: shards of the grid as it is now. stale: shards of other
-    grids, with their sizes. damaged: files set aside.
-    """
-
-    kinds: dict[str, int]
-    planned: int
-    stale: dict[str, int]
-    unfinished: tuple[Unfinished, ...]
-    damaged: dict[str, int]
+    kinds: Mapping[str, int]
+    stale: Mapping[str, int]
+    leftover: Mapping[str, int]
+    damaged: Mapping[str, int]
 
     @property
     def total(self) -> int:
         """All of it."""
-        return sum(self.kinds.values()) + sum(part.size for part in self.unfinished)
+        return sum(self.kinds.values())
 
 
 def of(folder: Path, shards: Collection[str]) -> Use:
     """Return what the files of a study take; shards: those planned, relative to its folder."""
-    kinds = dict.fromkeys(KINDS, 0)
-    planned, stale, damaged, unfinished = 0, {}, {}, []
+    kinds, stale, leftover, damaged = Counter[str](), {}, {}, {}
     for path, size in sorted(_files(folder)):
-        part = _PART.fullmatch(PurePosixPath(path).name)
-        if part:
-            process = int(part[1])
-            unfinished.append(Unfinished(path, size, process, job_log.started_at(process) is not None))
-            continue
         kind = _kind(path)
         kinds[kind] += size
         if path.endswith(".damaged"):
             damaged[path] = size
-        elif kind == "shards" and path in shards:
-            planned += size
-        elif kind == "shards":
+        elif kind == "shards" and path not in shards:
             stale[path] = size
-    return Use({kind: size for kind, size in kinds.items() if size}, planned, stale, tuple(unfinished), damaged)
+        elif (part := _part(path)) and job_log.started_at(int(part[1])) is None:
+            leftover[path] = size
+    return Use(kinds, stale, leftover, damaged)
+
+
+def _part(path: str) -> re.Match[str] | None:
+    return _PART.fullmatch(PurePosixPath(path).name)
 
 
 def _kind(path: str) -> str:
+    if _part(path):
+        return "unfinished"
     match path.split("/"):
         case ["sweeps", _, "shards", _]:
             return "shards"
-        case [top, _, *_] if top in KINDS:
+        case [top, _, *_] if top in _FOLDERS:
             return top
     return "other"
 

@@ -30,16 +30,8 @@ _STARTING = 0.12  # of Snakemake, to choose and start a job
 
 # Of an experiment and of a timing: by the axis or problem that its options name, or else by its measure.
 _EXPERIMENT = {
-    **{
-        "bounce-map": 2.4,
-        "apex-edge": 32.0,
-        "held-contacts": 16.0,
-        "rocking": 1.3,
-        "energy-budget": 0.8,
-        "failure-map": 1.0,
-        "friction-chatter": 0.8,
-        "precision-limits": 1.2,
-    },
+    **{"bounce-map": 2.4, "apex-edge": 32.0, "held-contacts": 16.0, "rocking": 1.3, "energy-budget": 0.8},
+    **{"failure-map": 1.0, "friction-chatter": 0.8, "precision-limits": 1.2},
     **{"model-ablation": 5.0, "work-precision": 33.0, "engine-contact": 2.0, "engine-limits": 2.6, "engine-throw": 6.5},
     **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},
     **{"flat-bounce": 25.0, "sliding-bounce": 21.0, "tumbling-throw": 75.0},
@@ -63,50 +55,38 @@ _LOOK = 0.01
 
 def seconds(study: Study) -> dict[Result, float]:
     """Return how long the job of each result of a study takes [s], on a core of the machine that `cost` is of."""
-    sweeps = study.sweeps.items()
-    plans = {f"{name}/{shard}": plan for name, sweep in sweeps for shard, plan in shards.of(sweep).items()}
-    found, compiled = dict[Result, float](), _is_compiled()
-    kinds = set[tuple[str, ...]]()
+    found, compiled, cold = dict[Result, float](), set[tuple[str, ...]](), not _is_compiled()
     for result in outputs.of(study):
-        found[result] = _JOB[result.stage] + _STARTING + _work(study, result, plans)
-        kind = _compiled_for(study, result)
-        if kind and kind not in kinds and not compiled:
-            kinds.add(kind)
-            found[result] += _COMPILING[result.stage] * (len(kind) - 2 if result.stage == "shard" else 1)
+        work, kinds = _work(study, result)
+        found[result] = _JOB[result.stage] + _STARTING + work
+        if cold:
+            found[result] += _COMPILING.get(result.stage, 0.0) * len(kinds - compiled)
+            compiled |= kinds
     return found
 
 
-def _work(study: Study, result: Result, plans: dict[str, shards.Shard]) -> float:
-    """Return the seconds of a job beyond its start."""
+def _work(study: Study, result: Result) -> tuple[float, set[tuple[str, ...]]]:
+    """Return the seconds of a job beyond its start, and the kinds of compiled code that it needs."""
+    name, _, part = result.name.partition("." if result.stage == "trajectory" else "/")
     match result.stage:
+        case "trajectory":
+            return 0.0, {("run", study.runs[name].model, part)}
         case "shard":
-            plan = plans[result.name]
-            return plan.seconds * (_LATER if plan.round else 1.0)
+            sweep = study.sweeps[name]
+            plan = shards.of(sweep)[part]
+            return plan.seconds * (_LATER if plan.round else 1.0), {(sweep.model, contact) for contact in sweep.contact}
         case "experiment":
-            return _measuring(study.experiments[result.name], _EXPERIMENT)
+            return _measuring(study.experiments[name], _EXPERIMENT), {("experiment", name)}
         case "timings":
-            return _measuring(study.timings[result.name], _TIMING)
-        case "figure":
-            return 0.0 if DRAWINGS[study.figures[result.name].draw].given == "runs" else _DRAWING
-    return 0.0
+            return _measuring(study.timings[name], _TIMING), {("timings", name)}
+        case "figure" if DRAWINGS[study.figures[name].draw].given != "runs":
+            return _DRAWING, set()
+    return 0.0, set()
 
 
 def _measuring(planned: Experiment, table: dict[str, float]) -> float:
     choice = planned.options.get("axis", planned.options.get("problem"))
     return table.get(str(choice), table.get(planned.measure, 0.0))
-
-
-def _compiled_for(study: Study, result: Result) -> tuple[str, ...]:
-    """Return what compiled code of a job's kind is compiled for, stage and model first; empty if it has none."""
-    name, _, preset = result.name.partition("." if result.stage == "trajectory" else "/")
-    match result.stage:
-        case "trajectory":
-            return "trajectory", study.runs[name].model, preset
-        case "shard":
-            return "shard", study.sweeps[name].model, *study.sweeps[name].contact
-        case "experiment" | "timings":
-            return result.stage, name
-    return ()
 
 
 def _is_compiled() -> bool:

@@ -120,10 +120,8 @@ def read(path: Path) -> Told | None:
         text, written = text_of(path), datetime.fromtimestamp(path.stat().st_mtime, UTC)
     except OSError:
         return None
-    first = _BEGUN.search(text)
-    asked = _ASKED.search(text)
+    first, asked, end = (pattern.search(text) for pattern in (_BEGUN, _ASKED, _END))  # a traceback may follow
     shares, counts = _TENTH.findall(text), _CELLS.findall(text)
-    end = _END.search(text)  # a traceback may follow
     return Told(
         begun=_time(first[1]) if first else None,
         process=int(first[2]) if first else 0,

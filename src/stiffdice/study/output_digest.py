@@ -37,7 +37,9 @@ def changed(told: Told, folder: Path, *files: str) -> list[str]:
 
 
 def reason(told: Told, files: list[str]) -> str:
-    """Return in words what is wrong with files that `changed` found."""
+    """Return in words what is wrong with files that `changed` found; empty if it found none."""
+    if not files:
+        return ""
     if not all(file in told.made for file in files):
         return "no log says that its job made it"
     kinds = " and ".join(PurePosixPath(file).suffix for file in files)

@@ -99,7 +99,6 @@ _SHOWN = {"sweeps": "frontier", "experiments": "experiment", "timings": "timings
 
 
 def _shown_by(study: Study, planned: PlannedFigure, given: str) -> list[Key]:
-    """Return the keys of what a figure or a table shows."""
-    if planned.run is not None:
-        return [("trajectory", f"{planned.run}.{preset}") for preset in study.runs[planned.run].presets]
+    if given == "runs":
+        return [("trajectory", f"{name}.{preset}") for name in planned.of for preset in study.runs[name].presets]
     return [(_SHOWN[given], name) for name in planned.of] + [("timings", name) for name in planned.timings]

@@ -18,7 +18,7 @@ from stiffdice.scene import scene as scenes
 from stiffdice.simulation import backend
 from stiffdice.simulation.engines import stepper
 from stiffdice.study import catalogue, job_log, output_digest, outputs
-from stiffdice.study.config import Experiment, PlannedFigure, Study
+from stiffdice.study.config import Study
 from stiffdice.study.outputs import Result
 
 # Of every job, beside its own.
@@ -81,17 +81,16 @@ def stale(asked: Mapping[Result, Asked], folder: Path) -> dict[Result, str]:
 
     asked: what is asked now; folder: results/STUDY.
     """
-    there = (result for result in asked if any((folder / file).exists() for file in result.files))
-    found = {result: _why(result, asked[result], folder) for result in there}
-    return {result: reason for result, reason in found.items() if reason}
-
-
-def _why(result: Result, asked: Asked, folder: Path) -> str:
-    told = job_log.read(folder / result.log)
-    reason = other(asked, told)
-    if not reason and told is not None and (changed := output_digest.changed(told, folder, *result.files)):
-        reason = output_digest.reason(told, changed)
-    return reason
+    found = {}
+    for result, now in asked.items():
+        if any((folder / file).exists() for file in result.files):
+            told = job_log.read(folder / result.log)
+            reason = other(now, told)
+            if told is not None and not reason:
+                reason = output_digest.reason(told, output_digest.changed(told, folder, *result.files))
+            if reason:
+                found[result] = reason
+    return found
 
 
 def other(asked: Asked, told: job_log.Told | None) -> str:
@@ -107,39 +106,28 @@ def other(asked: Asked, told: job_log.Told | None) -> str:
 
 def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
     """Return the digest of a result's scene, its plan as plain data, and the modules that this names."""
+    plan: list[Any]
+    name, _, part = result.name.partition("." if result.stage == "trajectory" else "/")
     match result.stage:
         case "trajectory":
-            name, _, preset = result.name.partition(".")
             run = study.runs[name]
             plan = [result.name, run._replace(scene="", presets=()), backend.version_of(run.simulator)]
-            return scenes.load(root / run.scene, preset=preset).digest, plan, *backend.code_of(run.simulator)
-        case "experiment":
-            return _measured(study.experiments[result.name], catalogue.EXPERIMENTS, root)
-        case "timings":
-            return _measured(study.timings[result.name], catalogue.TIMINGS, root)
+            return scenes.load(root / run.scene, preset=part).digest, plan, *backend.code_of(run.simulator)
+        case "experiment" | "timings":
+            timed = result.stage == "timings"
+            plans, entries = (study.timings, catalogue.TIMINGS) if timed else (study.experiments, catalogue.EXPERIMENTS)
+            asked = plans[name]
+            plan = [asked.measure, asked.options, stepper.attributes(asked.options.get("methods", ()))]
+            return scenes.load(root / asked.scene, asked.changes).digest, plan, entries[asked.measure].module
         case "figure" | "animation":
-            return _shown(study.figures[result.name], catalogue.DRAWINGS, study.dpi)
+            return "-", [study.figures[name], [study.dpi]], catalogue.DRAWINGS[study.figures[name].draw].module
         case "table":
-            return _shown(study.tables[result.name], catalogue.TABLES)
-    return _swept(study, result)
-
-
-def _measured(planned: Experiment, registry: Mapping[str, catalogue.Entry], root: Path) -> tuple[Any, ...]:
-    plan = [planned.measure, planned.options, stepper.attributes(planned.options.get("methods", ()))]
-    return scenes.load(root / planned.scene, planned.changes).digest, plan, registry[planned.measure].module
-
-
-def _shown(planned: PlannedFigure, registry: Mapping[str, catalogue.Entry], *dpi: int) -> tuple[Any, ...]:
-    return "-", [planned, dpi], registry[planned.draw].module
-
-
-def _swept(study: Study, result: Result) -> tuple[Any, ...]:
-    """Return the same of a shard, a survey, a collected sweep or a frontier; all of the last follows from its sweep."""
-    name, _, shard = result.name.partition("/")
+            return "-", [study.tables[name], []], catalogue.TABLES[study.tables[name].draw].module
     sweep = study.sweeps[name]
     if result.stage == "shard":
-        plan = [shard, backend.version_of(sweep.simulator)]
+        plan = [part, backend.version_of(sweep.simulator)]
         return sweep.scene.digest, plan, *backend.code_of(sweep.simulator)
+    # All of a frontier follows from its sweep.
     return sweep.scene.digest, None if result.stage == "frontier" else [sweep.config, dict(sweep.criteria)]
 
 

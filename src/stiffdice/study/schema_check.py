@@ -15,9 +15,6 @@ from stiffdice.scene.ground import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.engines import registry as engines
 
-# A misspelt key is told before the key that it leaves missing.
-_RANK = {"additionalProperties": 0, "required": 2, "oneOf": 3}
-
 
 def check(data: object, schema: str | Path, source: str) -> None:
     """Raise InputError unless a study's data are as the JSON schema in a file says; source: the study's file.
@@ -26,11 +23,16 @@ def check(data: object, schema: str | Path, source: str) -> None:
     """
     import jsonschema  # which takes a while to import
 
-    _refuse_nan(data, "", source)
-    validator = jsonschema.Draft202012Validator(_filled(yaml_loader.load(schema)))
-    errors = sorted(validator.iter_errors(data), key=_rank)
-    if errors:
-        raise InputError(f"{source}: {_reason(_innermost(errors[0]))}")
+    numbers = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number)
+    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)  # type: ignore[no-untyped-call]
+    error = jsonschema.exceptions.best_match(kind(_filled(yaml_loader.load(schema))).iter_errors(data))
+    if error is not None:
+        raise InputError(f"{source}: {_reason(error)}")
+
+
+def _is_number(_checker: object, value: object) -> bool:
+    """Return whether a value is a number; NaN is none: no bound of a schema stops it."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
 
 
 def _filled(schema: Any) -> Any:
@@ -44,31 +46,6 @@ def _filled(schema: Any) -> Any:
     for kind, names in known.items():
         schema["$defs"][kind] = {"enum": list(names), "errorMessage": f"allowed is {' or '.join(names)}"}
     return schema
-
-
-def _refuse_nan(data: object, where: str, source: str) -> None:
-    """Raise InputError if a number is not one: no bound of a schema stops a NaN."""
-    if isinstance(data, float) and math.isnan(data):
-        raise InputError(f"{source}: {where[1:]} = nan: allowed is a finite number")
-    parts = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
-    for key, part in parts:
-        _refuse_nan(part, f"{where}.{key}", source)
-
-
-def _rank(error: Any) -> int:
-    return _RANK.get(str(error.validator), 1)
-
-
-def _innermost(error: Any) -> Any:
-    """Return what is wrong within a value that may be of several kinds, if it is of one of them."""
-    if error.validator != "anyOf":
-        return error
-    others = {part.relative_schema_path[0] for part in error.context if part.validator == "type" and not part.path}
-    for part in sorted(error.context, key=_rank):
-        inner = _innermost(part)
-        if part.relative_schema_path[0] not in others and inner.validator != "anyOf":
-            return inner
-    return error
 
 
 def _reason(error: Any) -> str:

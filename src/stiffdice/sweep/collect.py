@@ -17,7 +17,7 @@ from stiffdice.simulation import dataset
 from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.outcome import Verdict
-from stiffdice.sweep.shard import MEANINGS
+from stiffdice.sweep.shard import MEANINGS, differing
 
 
 def collect(
@@ -36,10 +36,8 @@ def collect(
     for part in parts:
         judged = _judged(part, tolerances)
         pattern = judged.isel(cell=slice(0)) if pattern is None else pattern
-        ours, others = judged.attrs, pattern.attrs
-        differing = [key for key in ours | others if str(ours.get(key)) != str(others.get(key))]
-        if differing:
-            raise InputError(f"shards differ in {', '.join(differing)}; they are not of one sweep")
+        if other := differing(judged.attrs, pattern.attrs):
+            raise InputError(f"shards differ in {', '.join(other)}; they are not of one sweep")
         for name, variable in judged.variables.items():
             if "cell" in variable.dims:
                 columns.setdefault(str(name), []).append(variable.values)
@@ -58,20 +56,12 @@ def collect(
 def _sorted(pattern: xr.Dataset, columns: dict[str, list[npt.NDArray[Any]]]) -> xr.Dataset:
     """Return all cells, sorted, in the variables of a dataset of none; empties `columns`: none is to be there twice."""
     order = np.lexsort([np.concatenate(columns[key]) for key in ("steps", "stiffness", "contact")])
-    whole: dict[str, xr.Variable] = {}
-    for key, variable in pattern.variables.items():
-        name = str(key)
-        if name in columns:
-            axis = variable.dims.index("cell")
-            values = np.concatenate(columns.pop(name), axis).take(order, axis)
-            whole[name] = xr.Variable(variable.dims, values, variable.attrs)
-        else:
-            whole[name] = variable
-    return xr.Dataset(
-        {name: variable for name, variable in whole.items() if name not in pattern.coords},
-        {name: variable for name, variable in whole.items() if name in pattern.coords},
-        pattern.attrs,
-    )
+    whole = dict(pattern.variables)
+    for name in list(columns):
+        dims, attributes = whole[name].dims, whole[name].attrs
+        axis = dims.index("cell")
+        whole[name] = xr.Variable(dims, np.concatenate(columns.pop(name), axis).take(order, axis), attributes)
+    return xr.Dataset(whole, attrs=pattern.attrs).set_coords(list(pattern.coords))
 
 
 def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:

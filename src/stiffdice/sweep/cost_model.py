@@ -170,7 +170,6 @@ def _fall(pull: float, drag: Array, height: Array) -> tuple[Array, Array]:
 
 
 def _course(ball: _Ball, until: float) -> _Course:
-    """Return the course of runs up to a time [s]."""
     time, speed = np.fmin(ball.first, until), ball.speed
     rising = np.full(time.shape, min(ball.climb, until))
     falling, resting, landings = np.fmax(0.0, time - ball.climb), np.zeros(time.shape), np.zeros(time.shape)
@@ -224,8 +223,7 @@ def _share(ends: Array, start: float, end: Array | float) -> Array:
 def _stepped(sweep: Sweep, ball: _Ball, course: _Course, aside: bool, column: Index, h: Array) -> Array:
     """Return the steps that are computed one by one in runs until they rest, shape (cell,).
 
-    Contacts always; falls in drag; rises in drag if the cube turns or has others beside it. Of all other flights there
-    are some steps around each landing.
+    Of flights that can be skipped these are some around each landing.
     """
     flying = course.rising + course.falling
     slow = course.falling + (course.rising if aside or sweep.model in TURNING else 0.0)

@@ -38,14 +38,13 @@ _FIRST_REFINEMENT = 0.5
 
 
 class Shard(NamedTuple):
-    """Cells that one job computes and one file holds: number `part` of the `parts` of a round, counted from 0.
+    """Cells that one job computes and one file holds: number `part` of a round, counted from 0.
 
     seconds: predicted work. pieces: its cells, known beforehand in the first round, number 0, only.
     """
 
     round: int
     part: int
-    parts: int
     seconds: float
     pieces: tuple[Piece, ...] = ()
 
@@ -60,14 +59,14 @@ def of(sweep: Sweep) -> Mapping[str, Shard]:
     cut = _cut_at_multiples(first, costs, work)
     shards = {}
     for part, (pieces, seconds) in enumerate(cut):
-        shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, len(cut), seconds, pieces)
+        shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, seconds, pieces)
     columns = [piece.column for piece in first]
     expected, most = _FIRST_REFINEMENT * total, len(costs)
     for number in range(1, sweep.refine + 1):
         parts = max(1, min(math.ceil(expected / work), most))  # a round has fewer cells than those before it
         for part in range(parts):
             plan = [columns, number, part, parts]
-            shards[_digest(sweep, sweep.of_cells, plan)] = Shard(number, part, parts, expected / parts)
+            shards[_digest(sweep, sweep.of_cells, plan)] = Shard(number, part, expected / parts)
         expected, most = 2 * expected, 2 * most
     return MappingProxyType(shards)
 
@@ -100,9 +99,9 @@ def refined(sweep: Sweep, survey: xr.Dataset, number: int) -> list[Piece]:
     return pieces
 
 
-def later(sweep: Sweep, survey: xr.Dataset, number: int, parts: int) -> list[tuple[Piece, ...]]:
+def later(sweep: Sweep, survey: xr.Dataset, number: int) -> list[tuple[Piece, ...]]:
     """Return the cells of each shard of a later round; survey: of all rounds before it."""
-    return share(sweep, refined(sweep, survey, number), parts)
+    return share(sweep, refined(sweep, survey, number), len(rounds(of(sweep), number)))
 
 
 def share(sweep: Sweep, pieces: Sequence[Piece], parts: int) -> list[tuple[Piece, ...]]:

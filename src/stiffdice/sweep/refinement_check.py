@@ -7,6 +7,7 @@ whichever cell chance put last. What they may differ by is told from the dense s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ import xarray as xr
 from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.sweep.stability_limits import edges
+from stiffdice.sweep import stability_limits
 
 # Gaps between failing cells that say how often a cell fails near the edge, and cells to which two scans tell an edge at
 # best. Measured on re-jittered dense scans, 92 to 98 % of their edges then lie in each other's bands.
@@ -36,7 +37,7 @@ class Scan(NamedTuple):
     @property
     def edges(self) -> dict[str, float]:
         """Return what `stability_limits.edges` finds in it."""
-        return edges(self.steps, self.shares == 1)
+        return stability_limits.edges(self.steps, self.shares == 1)
 
 
 class Band(NamedTuple):
@@ -57,17 +58,14 @@ class Column(NamedTuple):
 
 def scans(found: xr.Dataset) -> dict[Column, Scan]:
     """Return all scans of a frontier."""
-    laws, criteria = meanings_of(found.contact), meanings_of(found.criterion)
-    parts = {}
-    for law in found.contact.values.tolist():
-        for stiffness in found.stiffness.values.tolist():
-            here = (found.cell_contact.values == law) & (found.cell_stiffness.values == stiffness)
-            steps = found.cell_steps.values[here]
-            order = np.argsort(steps, kind="stable")
-            for c, criterion in enumerate(criteria):
-                shares = found.pass_fraction.values[c, here][order]
-                parts[Column(laws[law], criterion, stiffness)] = Scan(steps[order], shares)
-    return parts
+    names, criteria, steps = meanings_of(found.contact), meanings_of(found.criterion), found.cell_steps.values
+    laws, stiffnesses, cells = stability_limits.scans(found.cell_contact.values, found.cell_stiffness.values, steps)
+    shares = found.pass_fraction.values
+    return {
+        Column(names[law], criterion, stiffness): Scan(steps[here], shares[c, here])
+        for (law, stiffness), here in zip(product(laws, stiffnesses.tolist()), cells, strict=True)
+        for c, criterion in enumerate(criteria)
+    }
 
 
 def band(scan: Scan, edge: str) -> Band:
@@ -136,17 +134,16 @@ def common(sweeps: Mapping[str, xr.Dataset]) -> list[Column]:
         for key in ("scene_digest", "model", "scheme", "simulator", "members"):
             if found.attrs[key] != first.attrs[key]:
                 raise InputError(f"refinement-check: sweep {name} has another {key.partition('_')[0]} than the first")
-        if _tolerances(found) != _tolerances(first):
-            raise InputError(
-                f"refinement-check: sweep {name} asks other criteria than the first, or at other tolerances"
-            )
-    found_in = [scans(found) for found in sweeps.values()]
-    columns = [column for column in found_in[0] if all(column in parts for parts in found_in)]
-    columns = [column for column in columns if _overlap([parts[column] for parts in found_in])]
-    if not columns:
-        raise InputError(
-            "refinement-check: needs sweeps that have a contact law, a stiffness and a span of steps in common"
+        asked, wanted = (
+            dict(zip(meanings_of(part.criterion), part.tolerance.values, strict=True)) for part in (found, first)
         )
+        if asked != wanted:
+            raise InputError(f"refinement-check: sweep {name} has other criteria than the first, or tolerances")
+    found_in = [scans(found) for found in sweeps.values()]
+    shared = (column for column in found_in[0] if all(column in parts for parts in found_in))
+    columns = [column for column in shared if _overlap([parts[column] for parts in found_in])]
+    if not columns:
+        raise InputError("refinement-check: needs sweeps with a contact law, stiffness and span of steps in common")
     return columns
 
 
@@ -154,7 +151,3 @@ def _overlap(compared: Sequence[Scan]) -> bool:
     """Return whether scans have a span of steps in common, and cells enough to tell errors from."""
     ends = [(int(scan.steps[0]), int(scan.steps[-1])) for scan in compared]
     return min(len(scan.steps) for scan in compared) > 2 and max(low for low, _ in ends) < min(high for _, high in ends)
-
-
-def _tolerances(found: xr.Dataset) -> dict[str, float]:
-    return dict(zip(meanings_of(found.criterion), found.tolerance.values.tolist(), strict=True))

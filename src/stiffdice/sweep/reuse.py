@@ -8,6 +8,7 @@ scheme and members are used, and of these only what is whole.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
 from stiffdice.sweep.grid import Column, Piece, Sweep
-from stiffdice.sweep.shard import shard_pattern
+from stiffdice.sweep.shard import Known, differing, shard_pattern
 
 Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], steps
 
@@ -57,26 +58,22 @@ class Kept:
                         self._places.setdefault(cell, (path, number))
             except InputError as error:
                 say(f"not used: {error}")
-        self._of_shard: dict[Path, list[int]] = {}
-        for path, number in self._places.values():
-            self._of_shard.setdefault(path, []).append(number)
         self._held: dict[int, dict[str, npt.NDArray[Any]]] = {}
         self._of: tuple[Path, slice] | None = None
 
     def __len__(self) -> int:
         return len(self._places)
 
-    def has(self, column: Column, steps: int) -> bool:
-        """Return whether a cell is there."""
-        return _cell(column, steps) in self._places
+    def __call__(self, column: Column, steps: int) -> Known | None:
+        """Return what gives some members of a cell, None if the cell is not there."""
+        place = self._places.get(_cell(column, steps))
+        return None if place is None else partial(self._runs, *place)
 
-    def runs(self, column: Column, steps: int, members: slice) -> dict[str, npt.NDArray[Any]]:
-        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
-        path, number = self._places[_cell(column, steps)]
+    def _runs(self, path: Path, number: int, members: slice) -> dict[str, npt.NDArray[Any]]:
         if self._of != (path, members) or number not in self._held:
             # Those after it are asked for next.
             at_once = max(1, reader.RUNS_AT_ONCE // (members.stop - members.start))
-            numbers = sorted(k for k in self._of_shard[path] if 0 <= k - number < at_once)
+            numbers = sorted(k for of, k in self._places.values() if of == path and 0 <= k - number < at_once)
             runs = reader.some(path, numbers, members)
             self._of = path, members
             self._held = {k: {name: values[row] for name, values in runs.items()} for row, k in enumerate(numbers)}
@@ -88,11 +85,10 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
 
     It saves opening all shards in every job, and decides no more than that; stiffness has six digits in it.
     """
-    grounds = [piece.column.stiffness for piece in pieces]
-    steps = [count for piece in pieces for count in piece.steps]
-    wanted = (
-        {"stiffness_{}_kg_s-2": (min(grounds), max(grounds)), "steps_{}": (min(steps), max(steps))} if steps else {}
-    )
+    grounds = [part.column.stiffness for part in pieces]
+    steps = [float(count) for part in pieces for count in part.steps]
+    spans = {"stiffness_{}_kg_s-2": grounds, "steps_{}": steps} if steps else {}
+    wanted = {name: (min(places), max(places)) for name, places in spans.items()}
     try:
         return {
             row["shard"]
@@ -108,5 +104,5 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
 def _cells_of(path: Path, like: xr.Dataset) -> Iterator[Cell]:
     """Yield the cells of a shard if its runs are those of another; raises InputError if it cannot be trusted."""
     attributes, cells = reader.head(path, CELL)
-    if {key: str(value) for key, value in attributes.items()} == {key: str(value) for key, value in like.attrs.items()}:
+    if not differing(attributes, like.attrs):
         yield from zip(*(cells[name].tolist() for name in CELL), strict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +17,15 @@ from stiffdice.errors import RefusedError
 from stiffdice.io import schema
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend, dataset
 from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.reference_run import references
-from stiffdice.simulation.run import Run, simulate
+from stiffdice.simulation.run import simulate
 from stiffdice.sweep.grid import Column, Piece, Sweep
+
+# What gives some members of a cell by name, shape (member, ...).
+Known = Callable[[slice], Mapping[str, npt.NDArray[Any]]]
 
 # What a shard keeps of each run besides the measures.
 _OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
@@ -35,22 +37,12 @@ MEANINGS = {"contact": list(LAWS), "verdict": dataset.VERDICTS, "ending": datase
 BLOCK = CHUNK_MEMBERS
 
 
-class Kept(Protocol):
-    """Runs that are there already, whoever keeps them."""
-
-    def has(self, column: Column, steps: int) -> bool:
-        """Return whether all members of a cell are there."""
-
-    def runs(self, column: Column, steps: int, members: slice) -> Mapping[str, npt.NDArray[Any]]:
-        """Return what a shard keeps of some members of a cell, by name, shape (member, ...)."""
-
-
 def compute_shard(
     sweep: Sweep,
     pieces: Sequence[Piece],
     path: str | Path,
     progress: Callable[[float], None] | None = None,
-    kept: Kept | None = None,
+    kept: Callable[[Column, int], Known | None] | None = None,
 ) -> int:
     """Compute one shard, store it (each run's measures and verdict, dimensions cell and member), and return its cells.
 
@@ -68,51 +60,34 @@ def compute_shard(
     return spool.cells
 
 
-def _compute_piece(sweep: Sweep, piece: Piece, spool: Spool, kept: Kept | None) -> Iterator[float]:
+def _compute_piece(
+    sweep: Sweep, piece: Piece, spool: Spool, kept: Callable[[Column, int], Known | None] | None
+) -> Iterator[float]:
     """Store all members at each number of steps, computed where they are not kept; yield the fraction that is done."""
     scene, scan = sweep.scene_of(piece.column), piece.steps
     first = spool.add_cells(len(scan))
     spool.put(_cell_values(sweep, piece.column, scan), slice(first, first + len(scan)))
-    there = [kept is not None and kept.has(piece.column, steps) for steps in scan]
+    there = [kept(piece.column, steps) if kept else None for steps in scan]
     launches = turned(scene, sweep.model, sweep.members)
+    how: dict[str, Any] = {"simulator": sweep.simulator, "scheme": sweep.scheme, "hop_height": sweep.hop_height}
+    asked: dict[str, Any] = {"criteria": sweep.criteria, "stop": sweep.criteria if sweep.early_stop else None}
     for start in range(0, sweep.members, BLOCK):
         block = slice(start, min(start + BLOCK, sweep.members))
-        compared = None
         if "trajectory" in sweep.criteria and not all(there):
             distinct = launches[block] if sweep.model in TURNING else launches[:1]
-            compared, _ = references(scene, sweep.model, distinct, sweep.horizon)
+            asked["references"], _ = references(scene, sweep.model, distinct, sweep.horizon)
         for batch in range(0, len(scan), CHUNK_CELLS):
             runs = []
             for steps, known in zip(scan[batch : batch + CHUNK_CELLS], there[batch:], strict=False):
-                if known and kept is not None:
-                    runs.append(kept.runs(piece.column, steps, block))
-                else:
-                    runs.append(_run_values(_run(sweep, scene, steps, launches, block, compared)))
+                if known:
+                    runs.append(known(block))
+                    continue
+                members = phased(scene, sweep.model, steps, sweep.members, launches, block)
+                run = simulate(scene, model=sweep.model, steps=steps, members=members, **how, **asked)
+                runs.append(run.measures | {name: getattr(run, name) for name in _OF_RUNS})
             cells = slice(first + batch, first + batch + len(runs))
             spool.put({name: np.stack([run[name] for run in runs]) for name in runs[0]}, cells, block)
             yield (start + (block.stop - start) * (batch + len(runs)) / len(scan)) / sweep.members
-
-
-def _run(
-    sweep: Sweep,
-    scene: Scene,
-    steps: int,
-    launches: npt.NDArray[np.void],
-    block: slice,
-    compared: npt.NDArray[np.void] | None,
-) -> Run:
-    return simulate(
-        scene,
-        model=sweep.model,
-        simulator=sweep.simulator,
-        scheme=sweep.scheme,
-        steps=steps,
-        members=phased(scene, sweep.model, steps, sweep.members, launches, block),
-        criteria=sweep.criteria,
-        stop=sweep.criteria if sweep.early_stop else None,
-        references=compared,
-        hop_height=sweep.hop_height,
-    )
 
 
 def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str, Any]:
@@ -123,11 +98,6 @@ def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str,
         "steps": np.array(scan, np.int64),
         "omega_h": np.array([linear_theory.omega_h(scene, steps) for steps in scan]),
     }
-
-
-def _run_values(run: Run) -> dict[str, Any]:
-    """Return what is kept of the runs of a cell by name, shape (member, ...)."""
-    return run.measures | {name: getattr(run, name) for name in _OF_RUNS}
 
 
 def shard_pattern(sweep: Sweep) -> xr.Dataset:
@@ -190,10 +160,14 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
         raise RefusedError("not the shard planned: cells are missing")
 
 
+def differing(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
+    """Return the names of attributes that two files of runs do not share."""
+    return [key for key in {**ours, **theirs} if str(ours.get(key)) != str(theirs.get(key))]
+
+
 def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
     """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
-    ours, theirs = pattern.attrs, part.attrs
-    if other := [key for key in ours | theirs if str(ours.get(key)) != str(theirs.get(key))]:
+    if other := differing(pattern.attrs, part.attrs):
         raise RefusedError(f"not the shard planned: other {', '.join(other)}")
     for name in pattern.variables.keys() | part.variables.keys():
         kinds = {(data[name].dims, data[name].dtype) for data in (pattern, part) if name in data.variables}

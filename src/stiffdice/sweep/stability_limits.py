@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,42 +97,41 @@ def confidence(passing: npt.NDArray[np.int64], members: int) -> tuple[Values, Va
     return np.clip(middle - width, 0.0, share), np.clip(middle + width, share, 1.0)
 
 
+def scans(
+    contact: npt.NDArray[np.int8], stiffness: Values, steps: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int8], Values, list[npt.NDArray[np.int64]]]:
+    """Return the contact laws and stiffnesses of some cells, ascending, and the numbers of the cells of each column.
+
+    Columns are in the order of contact law and stiffness, the cells of each in that of steps.
+    """
+    laws, law_of = np.unique(contact, return_inverse=True)
+    stiffnesses, stiffness_of = np.unique(stiffness, return_inverse=True)
+    column = law_of * len(stiffnesses) + stiffness_of
+    order = np.lexsort([steps, column])
+    return laws, stiffnesses, np.split(order, np.searchsorted(column[order], range(1, len(laws) * len(stiffnesses))))
+
+
 def find(sweep: xr.Dataset) -> xr.Dataset:
     """Return the frontier of a collected sweep by contact law, criterion and stiffness; and the scan, by cell."""
-    criteria = meanings_of(sweep.criterion)
-    laws, law_of = np.unique(sweep.contact.values, return_inverse=True)
-    stiffnesses, stiffness_of = np.unique(sweep.stiffness.values, return_inverse=True)
-    column = law_of * len(stiffnesses) + stiffness_of
-    by_column = np.argsort(column, kind="stable")
-    ends = np.searchsorted(column[by_column], np.arange(len(laws) * len(stiffnesses) + 1))
-    shape = (len(laws), len(criteria), len(stiffnesses))
-    found = {name: np.full(shape, np.nan) for name in (*EDGES, "flips")}
-    fits = {name: np.full((*shape[:2], len(EDGES)), np.nan) for name in FIT}
-    passes = sweep.failing.values == 0
-    for k in range(len(laws)):
-        for c in range(len(criteria)):
-            inside = np.zeros((len(EDGES), len(stiffnesses)), bool)
-            for s in range(len(stiffnesses)):
-                first = k * len(stiffnesses) + s
-                scan = by_column[ends[first] : ends[first + 1]]
-                row = passes[c, scan]
-                for name, value in edges(sweep.steps.values[scan], row).items():
-                    found[name][k, c, s] = value
-                inside[:, s] = not row[0], row[-1], row[-1]
-            for e, edge in enumerate(EDGES):
-                # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
-                measured = np.where(inside[e], found[edge][k, c], np.nan)
-                for name, value in power_law(stiffnesses, measured).items():
-                    fits[name][k, c, e] = value
-    return _dataset(sweep, laws, stiffnesses, found, fits)
+    steps, passes = sweep.steps.values, sweep.failing.values == 0
+    laws, stiffnesses, cells = scans(sweep.contact.values, sweep.stiffness.values, steps)
+
+    def by_column(values: Sequence[Any]) -> npt.NDArray[Any]:
+        """values: shape (criterion, column)."""
+        return np.array(values).reshape(len(passes), len(laws), len(stiffnesses)).swapaxes(0, 1)
+
+    of_scans = [[edges(steps[scan], row[scan]) for scan in cells] for row in passes]
+    found = {name: by_column([[part[name] for part in row] for row in of_scans]) for name in (*EDGES, "flips")}
+    first, last = (by_column(passes[:, [scan[end] for scan in cells]]) for end in (0, -1))
+    # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
+    measured = zip(EDGES, (~first, last, last), strict=True)
+    rows = np.stack([np.where(inside, found[edge], np.nan) for edge, inside in measured], axis=2)
+    fits = np.apply_along_axis(lambda row: list(power_law(stiffnesses, row).values()), -1, rows)
+    return _dataset(sweep, laws, stiffnesses, found | dict(zip(FIT, np.moveaxis(fits, -1, 0), strict=True)))
 
 
 def _dataset(
-    sweep: xr.Dataset,
-    laws: npt.NDArray[np.int8],
-    stiffnesses: Values,
-    found: Mapping[str, Values],
-    fits: Mapping[str, Values],
+    sweep: xr.Dataset, laws: npt.NDArray[np.int8], stiffnesses: Values, found: Mapping[str, Values]
 ) -> xr.Dataset:
     scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
     limits = [
@@ -143,25 +142,21 @@ def _dataset(
     passing = members - sweep.failing.values.astype(np.int64)
     low, high = confidence(passing, members)
     values: dict[str, Any] = {
-        **found,
+        **{name: found[name] for name in (*EDGES, "flips")},
         "limit": limits,
         "pass_fraction": passing / members,
         "pass_fraction_low": low,
         "pass_fraction_high": high,
         "tolerance": sweep.tolerance.values,
-        **fits,
+        **{name: found[name] for name in FIT},
         "contact": laws,
         "criterion": sweep.criterion.values,
         "edge": np.arange(len(EDGES), dtype=np.int8),
         "stiffness": stiffnesses,
         **{f"cell_{name}": sweep[name].values for name in ("contact", "stiffness", "steps", "omega_h")},
     }
-    meanings = {
-        "contact": list(LAWS),
-        "cell_contact": list(LAWS),
-        "criterion": meanings_of(sweep.criterion),
-        "edge": EDGES,
-    }
+    names = {"criterion": meanings_of(sweep.criterion), "edge": EDGES}
+    meanings = names | {key: list(LAWS) for key in ("contact", "cell_contact")}
     attributes = sweep.attrs | {
         "title": "Edges of stability",
         "kind": "frontier",
@@ -173,21 +168,15 @@ def _dataset(
 
 def table(frontier: xr.Dataset) -> str:
     """Return the frontier as CSV: one line for each contact law, criterion and stiffness."""
-    laws = meanings_of(frontier.contact)
-    criteria = meanings_of(frontier.criterion)
-    columns = ("first_pass", "last_fail", "steps_needed", "flips")
-    lines = [
-        "contact,criterion,tolerance,stiffness_kg_s-2,limit_omega_h_2,"
-        + ",".join(columns)
-        + ",last_fail_exponent,last_fail_exponent_error"
-    ]
-    edge = meanings_of(frontier.edge).index("last_fail")
-    for k, law in enumerate(frontier.contact.values):
-        for c, criterion in enumerate(criteria):
-            fit = [f"{frontier[name].values[k, c, edge]:.4f}" for name in ("exponent", "exponent_error")]
-            for s, stiffness in enumerate(frontier.stiffness.values):
-                numbers = [frontier[name].values[k, c, s] for name in columns]
-                shown = ["" if np.isnan(number) else f"{number:.0f}" for number in numbers]
-                start = [laws[law], criterion, f"{frontier.tolerance.values[c]:g}", f"{stiffness:.6g}"]
-                lines.append(",".join([*start, f"{frontier.limit.values[s]:.1f}", *shown, *fit]))
+    laws, criteria = meanings_of(frontier.contact), meanings_of(frontier.criterion)
+    edge, columns = meanings_of(frontier.edge).index("last_fail"), (*EDGES, "flips")
+    head = ("contact", "criterion", "tolerance", "stiffness_kg_s-2", "limit_omega_h_2")
+    lines = [",".join([*head, *columns, "last_fail_exponent", "last_fail_exponent_error"])]
+    for k, c, s in np.ndindex(*frontier.first_pass.shape):
+        where = f"{laws[frontier.contact.values[k]]},{criteria[c]},{frontier.tolerance.values[c]:g}"
+        numbers = [frontier[name].values[k, c, s] for name in columns]
+        shown = ["" if np.isnan(number) else f"{number:.0f}" for number in numbers]
+        fit = [f"{frontier[name].values[k, c, edge]:.4f}" for name in ("exponent", "exponent_error")]
+        at = f"{frontier.stiffness.values[s]:.6g},{frontier.limit.values[s]:.1f}"
+        lines.append(",".join([where, at, *shown, *fit]))
     return "\n".join(lines) + "\n"
