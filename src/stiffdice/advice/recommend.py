@@ -83,16 +83,12 @@ def advise(
     tell("event")
     ladder = [] if scheme == "exact" else _ladder(pilot, patience)
     search = Search(pilot, linear_stability.hardest(pilot.scene, pilot.model), _shape(pilot, ladder), budget)
+    special = {"exact": lambda: _exact(pilot, error), "event": lambda: _event(pilot, ladder, error, patience)}
     options = []
     for name in schemes.SCHEMES if scheme is None else [scheme]:
         if not schemes.unfit(name, pilot.scene, pilot.model):
             tell(name)
-            if name == "exact":
-                options.append(_exact(pilot, error))
-            elif name == "event":
-                options.append(_event(pilot, ladder, error, patience))
-            else:
-                options.append(search.option(name, error))
+            options.append(special[name]() if name in special else search.option(name, error))
     options.sort(key=lambda option: (not option.keeps, option.seconds))
     best = _best(options)
     return Advice(
