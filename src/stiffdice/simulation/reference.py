@@ -1,8 +1,8 @@
 """What a run is compared with: the same launch on the same ground, computed finely, in one table.
 
-A reference is the scene's own launch under the same scheme at so small a step that its own error does not matter
-(it is measured by a second run at half the steps). Member k of an ensemble enters the same flight a little late; it is
-compared at the time since the scene's launch.
+A reference is the scene's own launch by the scheme `event`, at a tolerance whose error does not matter
+(`reference_run`). Member k of an ensemble enters the same flight a little late; it is compared at the time since the
+scene's launch.
 """
 
 from __future__ import annotations
