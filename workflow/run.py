@@ -104,10 +104,11 @@ def tied() -> None:
 
 
 @contextmanager
-def warm(environment: dict[str, str], named: bool) -> Iterator[dict[str, str]]:
+def warm(environment: dict[str, str], studies: list[str], named: bool) -> Iterator[dict[str, str]]:
     """Yield the environment in which jobs find a process that has imported what they need, and end it afterwards.
 
-    named: a profile of the user's own, whose jobs may run elsewhere. Without the process jobs do all by themselves.
+    studies: whose kernels it loads. named: a profile of the user's own, whose jobs may run elsewhere. Without the
+    process jobs do all by themselves.
     """
     if named or not hasattr(os, "pidfd_open"):
         yield environment
@@ -120,7 +121,7 @@ def warm(environment: dict[str, str], named: bool) -> Iterator[dict[str, str]]:
             yield environment
             return
         listener.listen()  # from here on who comes waits
-        command = [sys.executable, "workflow/warm.py", str(listener.fileno())]
+        command = [sys.executable, "workflow/warm.py", str(listener.fileno()), *studies]
         handles = [listener.fileno()]
         process = subprocess.Popen(command, cwd=ROOT, env=environment, pass_fds=handles, start_new_session=True)
         try:
@@ -172,7 +173,7 @@ def main() -> int:
     for line in told:
         print(f"stiffdice: {printable(line)}", file=sys.stderr)
     try:
-        with warm(os.environ | changes, named) as environment:
+        with warm(os.environ | changes, studies, named) as environment:
             status = rounds(command, environment, studies)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")

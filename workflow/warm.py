@@ -1,7 +1,7 @@
-"""A process that has imported what jobs need, and forks one child for each job: warm.py HANDLE, of a listening socket
+"""A process that has imported what jobs need, and forks one child for each job: warm.py HANDLE STUDY...
 
-A job then begins in milliseconds; a process of its own would import for a second or two. `run.py` starts it beside
-Snakemake, and `scripts/job.py` hands jobs over. Linux only.
+A job then begins in milliseconds; a process of its own would import, and load compiled kernels, for a second or two.
+HANDLE: of a listening socket. `run.py` starts it beside Snakemake, and `scripts/job.py` hands jobs over. Linux only.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import selectors
 import signal
 import socket
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,6 +24,7 @@ sys.path[:0] = [str(ROOT / "workflow" / "scripts"), str(ROOT / "src")]
 
 import job  # noqa: E402
 
+from stiffdice.errors import StiffdiceError  # noqa: E402
 from stiffdice.study.process import end_with_parent  # noqa: E402
 
 _MODULES = (
@@ -41,11 +43,10 @@ class Warm:
         self._events = selectors.DefaultSelector()
         self._events.register(self._listener, selectors.EVENT_READ, self._take)
 
-    def serve(self) -> NoReturn:
-        """Do jobs until this process is ended."""
-        while True:
-            for event, _ in self._events.select():
-                event.data()
+    def serve(self, seconds: float | None = None) -> None:
+        """Do what has come, or comes within some seconds, or without end."""
+        for event, _ in self._events.select(seconds):
+            event.data()
 
     def _take(self) -> None:
         client, _ = self._listener.accept()
@@ -97,15 +98,28 @@ class Warm:
         os.close(ended)
 
 
+def load(names: list[str]) -> Iterator[None]:
+    """Import what jobs need, and load the kernels of some studies, as far as they are stored, little by little."""
+    for name in _MODULES:
+        importlib.import_module(name)
+        yield
+    from stiffdice.study import config, warm_up
+
+    for name in names:
+        with contextlib.suppress(StiffdiceError):  # which Snakemake tells
+            yield from warm_up.load_kernels(config.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml"))
+
+
 def main() -> NoReturn:
-    """Listen, import, and do jobs until the process that started this one ends."""
+    """Load, and do jobs, until the process that started this one ends."""
     end_with_parent("run.py")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm = Warm(socket.socket(fileno=int(sys.argv[1])))
-    for name in _MODULES:
-        importlib.import_module(name)
+    for _ in load(sys.argv[2:]):
+        warm.serve(0)
     gc.freeze()
-    warm.serve()
+    while True:
+        warm.serve()
 
 
 if __name__ == "__main__":

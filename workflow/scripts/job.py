@@ -38,6 +38,9 @@ class Sealed:
     def __reduce__(self) -> tuple[type[bytes], tuple[bytes]]:
         return bytes, (pickle.dumps(self.planned),)
 
+    def __str__(self) -> str:
+        return str(self.planned)
+
 
 class Job(NamedTuple):
     """A job as plain data.

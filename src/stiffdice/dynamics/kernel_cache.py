@@ -7,7 +7,9 @@ import hashlib
 import pickle
 import shutil
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,21 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 
 _dumps: Callable[[object], bytes] = serialize.dumps  # numba has it without types
 _DIGEST = hashlib.sha256().digest_size
+_LOADING: ContextVar[bool] = ContextVar("_LOADING", default=False)
+
+
+class NotStoredError(Exception):
+    """A kernel is not on disk, and is not to be compiled now."""
+
+
+@contextmanager
+def only_stored() -> Iterator[None]:
+    """Raise NotStoredError where the block would have to compile a kernel."""
+    token = _LOADING.set(True)
+    try:
+        yield
+    finally:
+        _LOADING.reset(token)
 
 
 class KernelFiles:
@@ -81,6 +98,13 @@ class KernelCache(FunctionCache):
         self._cache_file = KernelFiles(
             Path(locator.get_cache_path()), self._impl.filename_base, locator.get_source_stamp()
         )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is stored, None if that is nothing; raises NotStoredError for nothing in `only_stored`."""
+        found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        if found is None and _LOADING.get():
+            raise NotStoredError
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled; where it cannot be stored, it serves this process alone."""

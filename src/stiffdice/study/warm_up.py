@@ -1,0 +1,69 @@
+"""Shortest runs that load the compiled kernels a study's jobs need, for a process that the jobs are forked from."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from stiffdice.dynamics.kernel_cache import NotStoredError, only_stored
+from stiffdice.errors import StiffdiceError
+from stiffdice.scene import scene as scenes
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.backend import OURS
+from stiffdice.simulation.initial_conditions import phased, turned
+from stiffdice.simulation.reference_run import references
+from stiffdice.simulation.run import simulate
+from stiffdice.study.config import PlannedRun, Study
+
+_MEMBERS = 4  # of a cell: so many go side by side
+_DURATION = 1e-6  # s: in which no cube that is thrown reaches the ground
+
+
+def load_kernels(study: Study, root: Path = Path()) -> Iterator[None]:
+    """Load what is stored, and compile nothing; yields between two runs of one step. root: where the scenes are."""
+    seen = set()
+    for planned in study.runs.values():
+        for preset in planned.presets:
+            scene = scenes.load(root / planned.scene, preset=preset)
+            kernels = (scene.ground.contact, planned.model, planned.scheme)
+            if planned.simulator == OURS and kernels not in seen:
+                seen.add(kernels)
+                with _only_loading():
+                    _trajectory(scene, planned)
+                yield
+    for sweep in study.sweeps.values():
+        for law in sweep.contact if sweep.simulator == OURS else ():
+            with _only_loading():
+                _cell(
+                    dataclasses.replace(sweep.scene.with_ground(contact=law), duration=_DURATION),
+                    sweep.model,
+                    sweep.scheme,
+                    sweep.criteria,
+                )
+            yield
+
+
+@contextmanager
+def _only_loading() -> Iterator[None]:
+    """End the block where it would compile; and where the scene is such that its jobs fail, which they tell."""
+    with contextlib.suppress(NotStoredError, StiffdiceError), only_stored():
+        yield
+
+
+def _trajectory(scene: Scene, planned: PlannedRun) -> None:
+    run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
+    if planned.scheme in energy_budget.BOOKED:
+        energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
+
+
+def _cell(scene: Scene, model: str, scheme: str, criteria: Mapping[str, float]) -> None:
+    launches = turned(scene, model, _MEMBERS)
+    compared = references(scene, model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
+    members = phased(scene, model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
+    asked: dict[str, Any] = {"criteria": criteria, "stop": criteria, "references": compared}
+    simulate(scene, model=model, scheme=scheme, steps=1, members=members, **asked)

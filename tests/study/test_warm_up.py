@@ -1,0 +1,45 @@
+"""What a process that jobs are forked from loads beforehand: kernels that are stored, and no others."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+# Loads the kernels of the study `quick` and says how many signatures the loop of runs has then.
+LOAD = """
+from stiffdice.simulation import run
+from stiffdice.study import config, warm_up
+looks = list(warm_up.load_kernels(config.load("config/quick.yaml", "workflow/schemas/study.schema.yaml")))
+print(len(looks), len(run._march.overloads))
+"""
+# Runs what `quick` runs, in the listings' order.
+RUN = """
+from stiffdice.scene import scene
+from stiffdice.simulation.run import simulate
+for preset in ("as_listed", "as_written"):
+    simulate(scene.load("config/scenes/figure-01.yaml", preset=preset), model="tumbling", steps=1, every=1)
+"""
+
+
+def python(text: str, cache: Path) -> str:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-c", text]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_what_is_stored_is_loaded_and_nothing_is_compiled(tmp_path):
+    """A cold start is left to the jobs, which compile at once on all cores."""
+    looks, loaded = python(LOAD, tmp_path).split()
+    assert int(looks) > 1
+    assert loaded == "0"
+    assert not list(tmp_path.rglob("*.nbc"))
+    python(RUN, tmp_path)
+    stored = sorted(tmp_path.rglob("*.nbc"))
+    assert python(LOAD, tmp_path).split() == [looks, "2"]  # one for each contact law
+    assert sorted(tmp_path.rglob("*.nbc")) == stored
