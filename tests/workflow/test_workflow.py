@@ -217,7 +217,7 @@ def test_a_changed_style_redraws_only(finished, edited):
 
 
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
-    edited("src/stiffdice/dynamics/contact.py", lambda text: text.replace("grip = ", "grip = 1.0 * "))
+    edited("src/stiffdice/dynamics/contact.py", lambda text: text.replace("push = times(fn", "push = times(1.0 * fn"))
     runs = {"shard": 2, "trajectory": 2, "experiment": 2, "timing": 1}
     everything = runs | {"collect": 1, "frontier": 1, "figure": 4, "table": 1}
     assert finished.jobs_due() == everything

@@ -32,7 +32,9 @@ def check(data: object, schema: str | Path, source: str) -> None:
 
 def _is_number(_checker: object, value: object) -> bool:
     """Return whether a value is a number; NaN is none: no bound of a schema stops it."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value)
+    return not isinstance(value, bool) and (
+        isinstance(value, int) or (isinstance(value, float) and not math.isnan(value))
+    )
 
 
 def _filled(schema: Any) -> Any:

@@ -110,6 +110,7 @@ def test_a_ladder_ends_where_the_budget_does(throw):
 
 def test_equal_calls_give_equal_bytes_and_files_keep_everything(flat, tmp_path):
     again = work_precision.measure(SCENE, **FLAT, steps=1e8)
+    xr.testing.assert_identical(flat, again)  # which says where they differ
     for name, found in (("a", flat), ("b", again)):
         write_dataset(found, tmp_path / f"{name}.h5")
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()

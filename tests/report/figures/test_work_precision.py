@@ -9,7 +9,7 @@ from stiffdice.experiments.work_precision import time as work_precision_time
 from stiffdice.experiments.work_precision.effort import STEPPING
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import style
+from stiffdice.report.figures import method_style, style
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines.registry import PEERS, SOLVERS
 
@@ -79,7 +79,7 @@ def test_the_floor_is_drawn_and_within_the_axes(data):
 
 def test_times_that_were_not_taken_are_hollow(data, timings):
     panel = drawn("work-precision", data | timings).axes[0]
-    look = style.method_look("symplectic_euler")
+    look = method_style.look("symplectic_euler")
     marks = [
         line
         for line in panel.get_lines()
@@ -105,7 +105,7 @@ def test_the_cost_is_drawn_with_the_papers_law_beside(data):
 
 def test_every_method_has_a_look_of_its_own():
     looks = {
-        (style.method_look(name)["color"], style.method_look(name)["marker"])
+        (method_style.look(name)["color"], method_style.look(name)["marker"])
         for name in [*SCHEMES, *SOLVERS, *STEPPING]
     }
     assert len(looks) == len(SCHEMES) + len(SOLVERS) + len(STEPPING)

@@ -18,8 +18,6 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.errors import printable
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.methods import name_of
-from stiffdice.simulation.engines.registry import PEERS
 
 # Okabe and Ito, "Color Universal Design" (2008), ordered by lightness in grey.
 BLUE, VERMILION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
@@ -59,26 +57,6 @@ VERDICT_LOOKS: dict[str, dict[str, str]] = {
     "stalled": {"color": PURPLE},
     "blew_up": {"color": "#B33C00"},
     "left_numeric_range": {"color": INK},
-}
-
-# Of a method: colour and mark.
-METHOD_LOOKS: dict[str, dict[str, Any]] = {
-    "symplectic_euler": {"color": BLUE, "marker": "o"},
-    "forward_euler": {"color": ORANGE, "marker": "v"},
-    "velocity_verlet": {"color": "#56B4E9", "marker": "s"},
-    "rk4": {"color": PURPLE, "marker": "D"},
-    "implicit_euler": {"color": "#997700", "marker": "^"},
-    "exact": {"color": GREEN, "marker": "*"},
-    "event": {"color": VERMILION, "marker": "P"},
-    "scipy_dop853": {"color": QUIET, "marker": "<"},
-    "scipy_lsoda": {"color": INK, "marker": ">"},
-    "scipy_radau": {"color": "#a9a9a9", "marker": "x"},
-    "mujoco": {"color": BLUE, "marker": "d"},
-    "pybullet": {"color": ORANGE, "marker": "h"},
-    "drake": {"color": PURPLE, "marker": "p"},
-    "scipy": {"color": INK, "marker": ">"},
-    "octave": {"color": GREEN, "marker": "X"},
-    "numpy": {"color": VERMILION, "marker": "+"},
 }
 
 _CRITERION_WORDS = {
@@ -152,18 +130,6 @@ def line(label: str, **look: Any) -> Line2D:
 def mark(label: str, marker: str, **look: Any) -> Line2D:
     """Return a mark without a line for a legend."""
     return Line2D([], [], label=label, linestyle="none", marker=marker, **look)
-
-
-def method_look(method: str) -> dict[str, Any]:
-    """Return colour, mark and line of a method: our schemes full, engines and solvers dashed."""
-    dashes = "--" if method in PEERS else "-"
-    look = METHOD_LOOKS.get(method, {"color": QUIET, "marker": "."})
-    return look | {"linestyle": dashes, "linewidth": 1.0, "markersize": 6 if method == "exact" else 4}
-
-
-def method_handles(methods: Iterable[str]) -> list[Line2D]:
-    """Return a legend's lines."""
-    return [line(name_of(method), **method_look(method)) for method in methods]
 
 
 def area(label: str, color: str, **look: Any) -> Patch:

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from stiffdice.dynamics.state import Array
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import style
+from stiffdice.report.figures import method_style, style
 from stiffdice.report.methods import engines_note
 from stiffdice.report.number_format import ground_words
 from stiffdice.report.tables.work_precision import ERRORS, Found, found_in
@@ -83,7 +83,7 @@ def _grid(title: str, rows: list[Found], columns: int, sharex: Any) -> tuple[Fig
 
 def _legend(figure: Figure, rows: list[Found], handles: Iterable[Any], **words: Any) -> None:
     names = list(dict.fromkeys(name for found in rows for name in found.methods))
-    handles = [*style.method_handles(names), *handles]
+    handles = [*method_style.handles(names), *handles]
     figure.legend(handles=handles, loc="outside lower center", ncols=6, **words)
 
 
@@ -93,7 +93,7 @@ def _hollow(label: str, **look: Any) -> Any:
 
 def _draw_method(panel: Any, method: str, x: Array, y: Array, full: npt.NDArray[np.bool_]) -> None:
     """Draw a method's line, its marks full or hollow."""
-    look = style.method_look(method)
+    look = method_style.look(method)
     panel.plot(x, y, markevery=0, label=method, **look | {"marker": ""})
     panel.plot(x[full], y[full], **look | {"linestyle": "none"})
     panel.plot(x[~full], y[~full], **look | {"linestyle": "none", "markerfacecolor": "none"})
@@ -125,7 +125,7 @@ def _costs_panel(panel: Any, found: Found, measure: str, bound: float) -> None:
         values, tried = np.array([cost.value for cost in costs]), np.array([cost.tried for cost in costs])
         _draw_method(panel, method, stiffness, values, np.array([cost.reached for cost in costs]))
         beyond, known = np.isnan(values), np.flatnonzero(np.isfinite(values))
-        panel.plot(stiffness[beyond], tried[beyond], **style.method_look(method) | _MORE | {"linestyle": "none"})
+        panel.plot(stiffness[beyond], tried[beyond], **method_style.look(method) | _MORE | {"linestyle": "none"})
         if method == _LAW_OF and known.size:
             law = values[known[0]] * np.sqrt(stiffness / stiffness[known[0]])
             panel.plot(stiffness, law, color=style.INK, linestyle=":", linewidth=1.0, zorder=1)

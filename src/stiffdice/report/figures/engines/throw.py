@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import style
+from stiffdice.report.figures import method_style, style
 from stiffdice.report.methods import engines_note, name_of
 from stiffdice.report.number_format import readable
 
@@ -33,7 +33,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     contact = _first_contact(height)
     distance = np.clip(found.distance.values, *_SPAN)
     for k, name in enumerate(names):
-        look = style.method_look(name)
+        look = method_style.look(name)
         left.plot(found.time, found.position.values[k, -1, :, 2], **look | {"marker": ""})
         middle.plot(found.time[1:], distance[k, -1, 1:], markevery=0.1, **look)
         right.plot(found.evaluations[k], distance[k, :, contact], **look)
@@ -45,7 +45,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     right.set(xscale="log", yscale="log", xlabel="force evaluations [1]", ylabel="distance from the reference [m]")
     right.set_title(f"after the first landing, t = {float(found.time[contact]):.2f} s")
     reference = style.line(f"reference:\n{found.attrs['reference']}", **_REFERENCE)
-    figure.legend(handles=[reference, *style.method_handles(names)], loc="outside right center")
+    figure.legend(handles=[reference, *method_style.handles(names)], loc="outside right center")
     unfit = found.attrs.get("unfit", "")
     note = " ".join([_steps(found, names), engines_note([found]), f"Cannot: {unfit}." if unfit else ""])
     style.add_note(figure, note.strip())
