@@ -72,7 +72,9 @@ def test_two_studies_at_once_each_tell_of_their_own_jobs(project):
 def suspended(project):
     """A run of a study whose Snakemake stands still amid it."""
     first = start(project, run("many"))
-    (snakemake,) = wait_for(lambda: psutil.Process(first.pid).children())
+    (snakemake,) = wait_for(
+        lambda: [child for child in psutil.Process(first.pid).children() if "snakemake" in child.cmdline()]
+    )
     wait_for(lambda: list((project.folder / "results").glob("many/logs/**/*.log")))
     snakemake.suspend()
     yield first
