@@ -50,13 +50,16 @@ class Warm:
 
     def _take(self) -> None:
         client, _ = self._listener.accept()
+        handles: list[int] = []
         try:
             head, handles, _, _ = socket.recv_fds(client, 8, 2)
-            content = b""
-            while len(content) < int.from_bytes(head):
-                content += client.recv(1 << 20)
-        except (OSError, ValueError):
-            client.close()
+            with client.makefile("rb") as stream:
+                content = stream.read(int.from_bytes(head))
+        except OSError:
+            head = content = b""
+        if not head or len(content) < int.from_bytes(head):  # its script is gone
+            for opened in (client.detach(), *handles):
+                os.close(opened)
             return
         process = os.fork()
         if not process:
@@ -78,6 +81,8 @@ class Warm:
 
     def _forward(self, process: int, client: socket.socket) -> None:
         """Pass a signal on to a job; end the job if its script is gone."""
+        if client.fileno() < 0:  # the job ended in the same moment
+            return
         try:
             number = client.recv(1)
         except OSError:

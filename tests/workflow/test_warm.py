@@ -99,6 +99,15 @@ def test_jobs_end_with_the_warm_process_and_later_ones_do_without(warm, tmp_path
     assert log.read_text().splitlines()[2] == str(os.getpid())
 
 
+def test_a_script_that_is_killed_while_it_hands_over_leaves_the_warm_process_at_work(warm, tmp_path):
+    for part in (b"", (9).to_bytes(8), (9).to_bytes(8) + b"1"):
+        with socket.socket(socket.AF_UNIX) as script:
+            script.connect(os.environ["STIFFDICE_WARM"])
+            if part:
+                socket.send_fds(script, [part], [1, 2])
+    assert begun(tmp_path, "next", "say('made')")[0].wait(timeout=60) == 0
+
+
 def test_a_job_of_slurm_is_not_handed_over(warm, tmp_path, monkeypatch):
     """It has a node, memory and time of its own."""
     monkeypatch.setenv("SLURM_JOB_ID", "1")
