@@ -46,7 +46,19 @@ _FORMATS = {
 }
 # Files of the project that are described one by one, besides the study's and README.md, which is about the whole.
 _FILES = ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md")
-_HOMEPAGES = {"octave": "https://octave.org"}  # of what is not on PyPI
+_HOMEPAGES = {
+    "drake": "https://drake.mit.edu",
+    "h5netcdf": "https://h5netcdf.org",
+    "h5py": "https://www.h5py.org",
+    "llvmlite": "https://llvmlite.readthedocs.io",
+    "mujoco": "https://mujoco.org",
+    "numba": "https://numba.pydata.org",
+    "numpy": "https://numpy.org",
+    "octave": "https://octave.org",
+    "pybullet": "https://pybullet.org",
+    "scipy": "https://scipy.org",
+    "xarray": "https://xarray.dev",
+}
 
 
 class Facts(NamedTuple):
@@ -232,10 +244,10 @@ class _Crate:
         """Add whatever made the numbers, in the versions that the files of results give."""
         entities = []
         for name, number in self.facts.software:
-            home, url = _HOMEPAGES.get(name, f"https://pypi.org/project/{name}/"), None
-            if name == "stiffdice":
-                home, url = self.facts.citation.url or "", {"@id": "README.md"}
-            told = {"name": name, "softwareVersion": number, "url": home or url}
+            ours = name == "stiffdice"
+            home = (self.facts.citation.url if ours else _HOMEPAGES.get(name)) or ""
+            url = home or ({"@id": "README.md"} if ours else None)
+            told = {"name": name, "softwareVersion": number, "url": url}
             entities.append(self._add(f"{home}#{quote(f'{name}-{number}')}", "SoftwareApplication", **told))
         return entities
 
