@@ -16,10 +16,10 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import flat_bounce, linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import Array
 from stiffdice.experiments.measuring import bisected, mapped, numbers, span
 from stiffdice.scene import validation
+from stiffdice.scene.ground import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.criteria import apex
@@ -66,8 +66,8 @@ def measure(
     def predicted(law: str, height: float) -> list[float]:
         return [prediction(scene.with_ground(contact=law), height)]
 
-    found = mapped(last_fail, _MEASURED, contact=LAWS, duration=durations, hop_height=heights)
-    found |= mapped(predicted, _PREDICTED, contact=LAWS, hop_height=heights)
+    found = mapped(last_fail, _MEASURED, contact=CONTACT_LAWS, duration=durations, hop_height=heights)
+    found |= mapped(predicted, _PREDICTED, contact=CONTACT_LAWS, hop_height=heights)
     title = "Edge of apex by hop height and duration"
     attributes = dataset.provenance_attributes(title, scene, MODEL, SCHEME, __name__) | {
         "members": members,

@@ -17,7 +17,6 @@ import xarray as xr
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
@@ -32,7 +31,7 @@ from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
-_TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
+_TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL]
 
 # By mode: the axis about which a slight turn leaves four, two or one of the upright cube's nodes lowest. An edge and a
 # corner touch the ground with the longest arms when the cube is nearly flat; a steeper one has a lower frequency.
@@ -201,10 +200,10 @@ def _jacobian(contact: _Contact, damping: float, h: float) -> Array:
 
 
 @njit(cache=True)
-def _step_each(scheme: Any, model: Any, law: Any, physics: Physics, states: States, h: float) -> None:
+def _step_each(scheme: Any, model: Any, physics: Physics, states: States, h: float) -> None:
     """Advance each state by one step of h [s]."""
     for k in range(states.shape[0]):
-        schemes.step(scheme, model, law, physics, states[k], h, schemes.TOLERANCE)
+        schemes.step(scheme, model, physics, states[k], h, schemes.TOLERANCE)
 
 
 def _mode(scene: Scene, name: str) -> _Mode:

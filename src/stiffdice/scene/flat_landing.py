@@ -19,8 +19,7 @@ from __future__ import annotations
 
 import math
 
-# How many times as strong the damping of a flat cube is on the way in as on the way out, by contact law.
-APPROACH_DAMPING = {"ungated": 2.0, "gated": 1.0}
+from stiffdice.scene.ground import CONTACT_LAWS
 
 
 def leg(zeta: float) -> float:
@@ -34,7 +33,7 @@ def leg(zeta: float) -> float:
 
 def duration(law: str, zeta: float) -> float:
     """Return how long the contact lasts [1/ω], until its force is zero. law: contact law; zeta [1]: on the way out."""
-    return leg(APPROACH_DAMPING[law] * zeta) + leg(zeta)
+    return leg(CONTACT_LAWS[law].approach_damping * zeta) + leg(zeta)
 
 
 def restitution(law: str, zeta: float) -> float:
@@ -44,7 +43,7 @@ def restitution(law: str, zeta: float) -> float:
 
 def _loss(law: str, zeta: float) -> float:
     """Return −ln e."""
-    approach = APPROACH_DAMPING[law] * zeta
+    approach = CONTACT_LAWS[law].approach_damping * zeta
     return approach * leg(approach) + zeta * leg(zeta)
 
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import coordinates, mapped, numbers
 from stiffdice.scene import validation
+from stiffdice.scene.ground import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.run import Trajectory, simulate
@@ -74,7 +74,7 @@ def measure(
         errors = [_errors(run, full, before, parted) for run in lesser]
         return [*zip(*errors, strict=True), *_of_full_model(rough, full, coarse, after, before)]
 
-    found = mapped(compared, _DESCRIBED, contact=LAWS, friction=frictions, stiffness=grounds)
+    found = mapped(compared, _DESCRIBED, contact=CONTACT_LAWS, friction=frictions, stiffness=grounds)
     title = "What left out pieces of the model cost"
     attributes = dataset.provenance_attributes(title, scene, MODEL, SCHEME, __name__) | {
         "scene_note": "contact law, stiffness and friction are the dimensions'",

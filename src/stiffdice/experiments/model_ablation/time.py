@@ -14,7 +14,6 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models import sliding, tumbling
 from stiffdice.dynamics.models.registry import MODELS
@@ -99,8 +98,10 @@ def _runs(scene: Scene, model: str, steps: int) -> list[Callable[[], object]]:
 
 
 def _with_tensor(scene: Scene, steps: int) -> Callable[[], object]:
-    tags, h = (MODELS[MODEL], LAWS[scene.ground.contact]), scene.duration / steps
-    return partial(take_with_tensor, *tags, physics_of(scene), start_of(scene, MODEL), tensor_of(scene), h, steps)
+    h = scene.duration / steps
+    return partial(
+        take_with_tensor, MODELS[MODEL], physics_of(scene), start_of(scene, MODEL), tensor_of(scene), h, steps
+    )
 
 
 def tensor_of(scene: Scene) -> Array:
@@ -115,13 +116,11 @@ class _Rows(NamedTuple):
 
 
 @njit(cache=True)
-def take_with_tensor(
-    model: Any, law: Any, physics: Physics, states: States, tensor: Array, h: float, steps: int
-) -> None:
+def take_with_tensor(model: Any, physics: Physics, states: States, tensor: Array, h: float, steps: int) -> None:
     """Take so many steps of symplectic Euler of a body whose tensor of inertia turns with it: I ← R I Rᵀ."""
     state = states[0]
     for _ in range(steps):
-        wrench = models.force(model, law, physics, state)
+        wrench = models.force(model, physics, state)
         models.kick(model, physics, state, wrench, h)
         sliding.drift(physics, state, h)
         _solve_spin(state, tensor)
