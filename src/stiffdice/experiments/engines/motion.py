@@ -1,7 +1,9 @@
-"""The paper's throw in every engine: how far each is from the reference over time, with the more steps the closer.
+"""The same motion by every method: how far it is from the reference over time, and how many steps a second it takes.
 
 A throw is chaotic: at each landing the difference between two runs grows. So it is compared while it is small, and a
-method's own convergence beside it: what no shorter step makes less is not the step's, but the contact's.
+method's own convergence beside it: what no shorter step makes less is not the step's, but the contact's. What is timed
+is stepping alone, one run at a time: each engine has built its model of the scene before. A method that takes steps of
+its own is measured by its force evaluations.
 """
 
 from __future__ import annotations
@@ -14,8 +16,11 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import coordinates, mapped, quantity
-from stiffdice.experiments.work_precision.effort import EFFORTS
+from stiffdice.experiments.engines import flat_contact
+from stiffdice.experiments.measuring import coordinates, mapped, quantity, result
+from stiffdice.experiments.timing import interleaved, machine
+from stiffdice.experiments.work_precision.measure import EFFORTS
+from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, scene_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -32,7 +37,6 @@ _FINEST, _COARSER = schemes.FINEST, 1e-10
 # A method's efforts, from the least: parts of its steps, or tolerances of one that takes its own.
 _PARTS = (64, 16, 4, 1)
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-11)
-
 
 _DESCRIBED = {
     "position": ("centre of mass", "m", "effort", "time", "axis"),
@@ -80,6 +84,44 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     apart = np.linalg.norm(coarser - reference, axis=-1)
     found["reference_position"] = quantity(("time", "axis"), reference, "centre of mass by the reference", "m")
     found["reference_error"] = quantity("time", apart, "distance of the reference from a coarser one", "m")
-    attributes = dataset.provenance_attributes("The throw in every engine", scene, MODEL, "method", __name__)
     unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
-    return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit})
+    told = stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit}
+    return result(found, "The throw in every engine", scene, MODEL, "method", __name__, **told)
+
+
+TIMED = ("flat-bounce", "tumbling-throw")
+
+
+def time(
+    scene: Scene,
+    *,
+    methods: Sequence[str] = flat_contact.METHODS,
+    steps: int = 6_000,
+    affordable: float = 0.5,
+    rounds: int = 9,
+) -> xr.Dataset:
+    """Return median times of runs [s] and what they took, dimensions problem, method; not-a-number where one is unfit.
+
+    scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
+    of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
+    Raises InputError for a number out of range, and an engine that is not installed.
+    """
+    names = stepper.chosen_from(methods)
+    steps = SAMPLES * max(1, validation.count("steps", steps) // SAMPLES)
+    affordable, rounds = validation.number("affordable", affordable, "s", above=0), validation.count("rounds", rounds)
+    seconds, spread, taken = np.full((3, len(TIMED), len(names)), np.nan)
+    for p, problem in enumerate(PROBLEMS[name] for name in TIMED):
+        there = scene_of(problem, scene, scene.ground.stiffness)
+        fit = [k for k, name in enumerate(names) if stepper.unfit(name, there, problem.model) is None]
+        starts = [stepper.ready(names[k], there, problem.model, steps, SAMPLES) for k in fit]
+        counted = [start()().evaluations for start in starts]  # what is not compiled yet is now
+        taken[p, fit] = np.where([stepper.own_steps(names[k]) for k in fit], counted, steps)
+        seconds[p, fit], spread[p, fit] = interleaved(starts, rounds, affordable)
+    grid = ("problem", "method")
+    variables = coordinates(problem=TIMED, method=names) | {
+        "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),
+        "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
+        "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
+    }
+    told = stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
+    return result(variables, "Steps a second", scene, "problem", "method", __name__, **told)
