@@ -44,11 +44,11 @@ def cube(keys: Mapping[str, Any]) -> Resolved:
     if "side" not in keys:
         return dict(keys), ()
     geometry = validation.choice("cube.geometry", keys.get("geometry", GEOMETRY), GEOMETRIES)
-    side = validation.number("cube.side", keys["side"], "m", above=0)
-    radius = radius_of(side, geometry)
-    rest = {key: value for key, value in keys.items() if key != "side"}
-    told = f"cube.radius = {radius:.6g} m, from cube.side = {side:g} m by the {geometry} geometry"
-    return rest | {"radius": radius}, (told,)
+    rest = dict(keys)
+    side = validation.number("cube.side", rest.pop("side"), "m", above=0)
+    rest["radius"] = radius_of(side, geometry)
+    told = f"cube.radius = {rest['radius']:.6g} m, from cube.side = {side:g} m by the {geometry} geometry"
+    return rest, (told,)
 
 
 def ground(keys: Mapping[str, Any], cube: Cube, stiffness: float) -> Resolved:

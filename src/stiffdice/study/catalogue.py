@@ -86,16 +86,16 @@ EXPERIMENTS: dict[str, Entry] = {
     "model-ablation": Entry("stiffdice.experiments.model_ablation", "measure"),
     "held-contacts": Entry("stiffdice.experiments.held_contacts", "measure"),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
-    "engine-contact": Entry("stiffdice.experiments.engines.flat_contact", "contact"),
-    "engine-limits": Entry("stiffdice.experiments.engines.flat_contact", "limits"),
-    "engine-throw": Entry("stiffdice.experiments.engines.motion", "measure"),
+    "engine-contact": Entry("stiffdice.experiments.engines", "contact"),
+    "engine-limits": Entry("stiffdice.experiments.engines", "limits"),
+    "engine-throw": Entry("stiffdice.experiments.engines", "throw"),
 }
 
 # (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.
 TIMINGS: dict[str, Entry] = {
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "time"),
     "model-ablation": Entry("stiffdice.experiments.model_ablation", "time"),
-    "engine-speed": Entry("stiffdice.experiments.engines.motion", "time"),
+    "engine-speed": Entry("stiffdice.experiments.engines", "speed"),
 }
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice.experiments.engines import flat_contact, motion
+from stiffdice.experiments import engines
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.report.figures import style
 from stiffdice.report.figures.engines import limits as limits_drawing
@@ -19,12 +19,12 @@ METHODS = ["symplectic_euler", "scipy", "numpy"]
 
 @pytest.fixture(scope="module")
 def limits():
-    return flat_contact.limits(SCENE, methods=METHODS, omega_h=[0.1, 12.0], count=4, phases=2)
+    return engines.limits(SCENE, methods=METHODS, omega_h=[0.1, 12.0], count=4, phases=2)
 
 
 @pytest.fixture(scope="module")
 def speed():
-    return motion.time(SCENE, methods=METHODS, steps=120, rounds=1)
+    return engines.speed(SCENE, methods=METHODS, steps=120, rounds=1)
 
 
 @pytest.fixture(scope="module")

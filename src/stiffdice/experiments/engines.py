@@ -1,9 +1,14 @@
-"""One flat bounce, and a cube at rest, by any method: how long its step may be, and how right its contact is.
+"""What any method makes of a stiff contact: a flat bounce, a cube at rest, a throw; and its steps a second.
 
-Bounces are launched so that a step meets the ground at a chosen phase. `limits` goes from one ωh to the next: bounces
-at several phases are measured by their restitution, a nudged cube at rest by its largest distance from its place.
-`contact` says how a method's contact maps onto the gated law: the depth at rest, and a bounce without friction and with
-the scene's, over the exact. What is off and becomes less with the step is the step's; what stays is the contact's.
+`limits`: how long a step may be. Bounces are launched so that a step meets the ground at a chosen phase, and measured
+by their restitution; a nudged cube at rest is measured by its largest distance from its place. `contact`: how a
+method's contact maps onto the gated law, by the depth at rest, and a bounce without friction and with the scene's, over
+the exact. What is off and becomes less with the step is the step's; what stays is the contact's.
+
+`throw`: how far the scene's throw is from the reference over time. It is chaotic: at each landing the difference
+between two runs grows. So it is compared while it is small, and a method's own convergence beside it. `speed`: what is
+timed is stepping alone, one run at a time: each engine has built its model of the scene before. A method that takes
+steps of its own is measured by its force evaluations.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -22,12 +27,17 @@ from stiffdice.dynamics.state import STATE, Array, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity, result, scan, span
 from stiffdice.experiments.placement import contact_frequency, landing_speed, level, upright
+from stiffdice.experiments.timing import interleaved, machine
+from stiffdice.experiments.work_precision.measure import EFFORTS
+from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, scene_of
+from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Launch, Scene
+from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 
-MODEL = "sliding"
+FLAT_MODEL = "sliding"
 # The paper's scheme, the one that is like what engines do to contacts, and the engines that are always there.
 METHODS = ("symplectic_euler", "implicit_euler", "scipy", "numpy")
 
@@ -97,7 +107,7 @@ def limits(
     found["outcome"] = dimensions, outcome.astype(np.int8), enum_attributes("what becomes of the cube", OUTCOMES)
     found["exact_restitution"] = quantity((), flat_bounce.restitution(smooth, speed), "exact restitution")
     told = stepper.attributes(names) | {"scene_note": "ground: level, gated, without friction; an upright cube"}
-    return result(found, "The longest steps", scene, MODEL, "method", __name__, **told)
+    return result(found, "The longest steps", scene, FLAT_MODEL, "method", __name__, **told)
 
 
 def contact(
@@ -142,7 +152,7 @@ def contact(
     found = mapped(ratios, RATIOS, method=names, **axes)
     note = "ground: level, gated, stiffness and damping as the dimensions say; an upright cube"
     told = stepper.attributes(names) | {"scene_note": note}
-    return result(found, "Contacts over the exact ones", scene, MODEL, "method", __name__, **told)
+    return result(found, "Contacts over the exact ones", scene, FLAT_MODEL, "method", __name__, **told)
 
 
 @cache
@@ -167,7 +177,7 @@ def _heights_at_rest(method: str, scene: Scene, h: float, steps: int, nudge: flo
     launch = Launch((0.0, 0.0, height), (0.0, 0.0, 0.0), node_velocity="rigid")
     resting = dataclasses.replace(scene, launch=launch, duration=steps * h)
     states = np.zeros(steps, STATE)
-    stepper.start(method, resting, MODEL, start_of(resting, MODEL), h).advance(states, 1)
+    stepper.start(method, resting, FLAT_MODEL, start_of(resting, FLAT_MODEL), h).advance(states, 1)
     return np.asarray(states["position"][:, 2])
 
 
@@ -198,8 +208,8 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
     placed = Launch((0.0, 0.0, half + height), (x, y, -down), node_velocity="rigid")
     chunk = 3 + math.ceil(1.2 * (math.pi / contact_frequency(scene)) / h)
     scene = dataclasses.replace(scene, launch=placed, duration=h * (chunk * _PATIENCE))
-    states, outcome = start_of(scene, MODEL), "stays"
-    engine = stepper.start(method, scene, MODEL, states, h)
+    states, outcome = start_of(scene, FLAT_MODEL), "stays"
+    engine = stepper.start(method, scene, FLAT_MODEL, states, h)
     while outcome == "stays" and len(states) <= chunk * _PATIENCE:
         more = np.zeros(chunk, STATE)
         engine.advance(more, 1)
@@ -229,3 +239,102 @@ def _below(heights: Array) -> float:
     before, after = heights[:-1], heights[1:]
     share = np.where(before < 0, before, after) / np.where(before == after, 1.0, np.abs(after - before))
     return float(np.where((before < 0) & (after < 0), 1.0, np.abs(share) * ((before < 0) ^ (after < 0))).sum())
+
+
+THROW_MODEL, REFERENCE = "tumbling", "event"
+THROWN = ("symplectic_euler", "scipy", "numpy")
+
+# Of the reference, and of the run that says how far it can be trusted.
+_FINEST, _COARSER = schemes.FINEST, 1e-10
+
+# A method's efforts, from the least: parts of its steps, or tolerances of one that takes its own.
+_PARTS = (64, 16, 4, 1)
+_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-11)
+
+_THROW = {
+    "position": ("centre of mass", "m", "effort", "time", "axis"),
+    "distance": ("distance of the centre from the reference", "m", "effort", "time"),
+    "steps": (*EFFORTS["steps"], "effort"),
+    "tolerance": (*EFFORTS["tolerance"], "effort"),
+    "evaluations": ("evaluations of the force", "1", "effort"),
+}
+
+
+def throw(scene: Scene, *, methods: Sequence[str] = THROWN, steps: float = 4e7, samples: int = 400) -> xr.Dataset:
+    """Return where the cube is, dimensions method, effort, time, axis, and its distance from the reference.
+
+    methods: names of schemes and engines; one that cannot represent the scene is left out, and `unfit` says why.
+    steps: of the simplest scheme at the most; of another so many less as its steps take longer (`Peer.dearness`).
+    samples: equal parts of the duration, after which states are compared.
+    `reference_error` is how far the reference is from the same at a thousand times its tolerance.
+    Raises InputError for a number out of range, an engine that is not installed, and a scene that none can represent.
+    """
+    samples = validation.count("samples", samples)
+    most = validation.number("steps", steps, "1", at_least=samples)
+    reasons = {name: stepper.unfit(name, scene, THROW_MODEL) for name in stepper.chosen_from(methods)}
+    names = [name for name, why in reasons.items() if why is None]
+    if not names:
+        raise InputError(f"methods: none of them can represent the scene: {'; '.join(map(str, reasons.values()))}")
+
+    def path(method: str, steps: int, tolerance: float) -> tuple[Array, int]:
+        found = stepper.ready(method, scene, THROW_MODEL, steps, samples, tolerance)()()
+        return found.states["position"], found.evaluations
+
+    (reference, _), (coarser, _) = (path(REFERENCE, samples, size) for size in (_FINEST, _COARSER))
+
+    def efforts(method: str) -> tuple[Any, ...]:
+        own, finest = stepper.own_steps(method), most / stepper.dearness(method)
+        counts = [samples * max(1, round(finest / part / samples)) for part in _PARTS]
+        tried = [(samples, size) for size in _TOLERANCES] if own else [(count, np.nan) for count in counts]
+        places, evaluations = zip(*(path(method, *effort) for effort in tried), strict=True)
+        with np.errstate(all="ignore"):  # a run that blew up
+            distance = np.linalg.norm(np.array(places) - reference, axis=-1)
+        steps, tolerances = zip(*tried, strict=True)
+        return places, distance, np.zeros_like(steps) if own else steps, tolerances, evaluations
+
+    time = np.arange(samples + 1) / samples * scene.duration
+    found = mapped(efforts, _THROW, method=names) | coordinates(time=time, axis=dataset.AXES)
+    apart = np.linalg.norm(coarser - reference, axis=-1)
+    found["reference_position"] = quantity(("time", "axis"), reference, "centre of mass by the reference", "m")
+    found["reference_error"] = quantity("time", apart, "distance of the reference from a coarser one", "m")
+    unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
+    told = stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit}
+    return result(found, "The throw in every engine", scene, THROW_MODEL, "method", __name__, **told)
+
+
+TIMED = ("flat-bounce", "tumbling-throw")
+
+
+def speed(
+    scene: Scene,
+    *,
+    methods: Sequence[str] = METHODS,
+    steps: int = 6_000,
+    affordable: float = 0.5,
+    rounds: int = 9,
+) -> xr.Dataset:
+    """Return median times of runs [s] and what they took, dimensions problem, method; not-a-number where one is unfit.
+
+    scene: the problems of TIMED are made of it, at its own stiffness. methods: names of schemes and engines. steps:
+    of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
+    Raises InputError for a number out of range, and an engine that is not installed.
+    """
+    names = stepper.chosen_from(methods)
+    steps = SAMPLES * max(1, validation.count("steps", steps) // SAMPLES)
+    affordable, rounds = validation.number("affordable", affordable, "s", above=0), validation.count("rounds", rounds)
+    seconds, spread, taken = np.full((3, len(TIMED), len(names)), np.nan)
+    for p, problem in enumerate(PROBLEMS[name] for name in TIMED):
+        there = scene_of(problem, scene, scene.ground.stiffness)
+        fit = [k for k, name in enumerate(names) if stepper.unfit(name, there, problem.model) is None]
+        starts = [stepper.ready(names[k], there, problem.model, steps, SAMPLES) for k in fit]
+        counted = [start()().evaluations for start in starts]  # what is not compiled yet is now
+        taken[p, fit] = np.where([stepper.own_steps(names[k]) for k in fit], counted, steps)
+        seconds[p, fit], spread[p, fit] = interleaved(starts, rounds, affordable)
+    grid = ("problem", "method")
+    variables = coordinates(problem=TIMED, method=names) | {
+        "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),
+        "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
+        "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
+    }
+    told = stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
+    return result(variables, "Steps a second", scene, "problem", "method", __name__, **told)
