@@ -243,6 +243,8 @@ def _below(heights: Array) -> float:
 
 THROW_MODEL, REFERENCE = "tumbling", "event"
 THROWN = ("symplectic_euler", "scipy", "numpy")
+# The problems that `speed` times.
+TIMED = ("flat-bounce", "tumbling-throw")
 
 # Of the reference, and of the run that says how far it can be trusted.
 _FINEST, _COARSER = schemes.FINEST, 1e-10
@@ -300,9 +302,6 @@ def throw(scene: Scene, *, methods: Sequence[str] = THROWN, steps: float = 4e7, 
     unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
     told = stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit}
     return result(found, "The throw in every engine", scene, THROW_MODEL, "method", __name__, **told)
-
-
-TIMED = ("flat-bounce", "tumbling-throw")
 
 
 def speed(

@@ -142,7 +142,6 @@ def first_spin(scene: Scene, speed: float) -> float:
     return tipped * (1 + math.cos(math.pi * math.sqrt(ratio))) / (1 - ratio)
 
 
-# Of what is timed.
 TIMED_SCHEME = "symplectic_euler"
 ROLES = ("full", "least")
 

@@ -11,7 +11,6 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -72,12 +71,11 @@ def measure(
         "predicted": quantity("limit", list(predicted), "limit by its formula, in the unit that limit_units names"),
         "measured": quantity("limit", list(measured), "limit found in this code, in the unit that limit_units names"),
     }
-    told: dict[str, Any] = {
-        "scene_note": "ground: level, gated, without damping and friction; stiffness as the limit says",
-        "limit_units": "; ".join(f"{name}: {unit}" for name, (unit, _) in found.items()),
-        **{"bounce_stiffness": stiffness, "bounce_omega_h": omega_h, "coarse": coarse},
-    }
-    return result(variables, "Limits of double precision", bare, MODEL, SCHEME, __name__, **told)
+    note = "ground: level, gated, without damping and friction; stiffness as the limit says"
+    units = "; ".join(f"{name}: {unit}" for name, (unit, _) in found.items())
+    told = {"bounce_stiffness": stiffness, "bounce_omega_h": omega_h, "coarse": coarse}
+    title = "Limits of double precision"
+    return result(variables, title, bare, MODEL, SCHEME, __name__, scene_note=note, limit_units=units, **told)
 
 
 def _half_unit(value: float) -> float:

@@ -296,10 +296,13 @@ def problems(dataset: xr.Dataset) -> list[str]:
     for name, variable in KINDS[kind].variables.items():
         if name in dataset.variables:
             found = dataset[name]
-            theirs = {"dimensions": " ".join(map(str, found.dims)), "type": found.dtype.str[1:]}
-            theirs["units"] = found.attrs.get("units")
-            ours = {"dimensions": " ".join(variable.dimensions), "type": variable.type, "units": variable.units}
-            wrong += [f"{name} has {k} {theirs[k]}: allowed is {ours[k]}" for k in ours if ours[k] != theirs[k]]
+            for what, theirs, ours in (
+                ("dimensions", " ".join(map(str, found.dims)), " ".join(variable.dimensions)),
+                ("type", found.dtype.str[1:], variable.type),
+                ("units", found.attrs.get("units"), variable.units),
+            ):
+                if ours != theirs:
+                    wrong.append(f"{name} has {what} {theirs}: allowed is {ours}")
         elif variable.need == REQUIRED and version >= _numbers(variable.since):
             wrong.append(f"variable {name} is missing")
     text = told.get("config")
@@ -315,6 +318,5 @@ def _numbers(version: str) -> tuple[int, ...]:
 def _is(kind: str, value: Any) -> bool:
     if kind == TEXT:
         return isinstance(value, str)
-    if np.ndim(value) or np.asarray(value).dtype.kind not in ("i" if kind == WHOLE else "if"):
-        return False
-    return bool(np.isfinite(value))
+    kinds = "i" if kind == WHOLE else "if"
+    return np.ndim(value) == 0 and np.asarray(value).dtype.kind in kinds and bool(np.isfinite(value))

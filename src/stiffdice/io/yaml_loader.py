@@ -56,7 +56,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _line(node: yaml.Node | yaml.Event) -> str:
+def _line(node: Any) -> str:
     return f"line {node.start_mark.line + 1}"
 
 
