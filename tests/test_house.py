@@ -107,7 +107,7 @@ CHANGES = {
         ("import advise, archive, diff,", "import advise, archive, diff, greet,"),
         ("in (run, advise,", "in (greet, run, advise,"),
     ],
-    "scene/ground.py": [
+    "scene/flat_landing.py": [
         ('"gated": ContactLaw(0.0, 1.0)}', '"gated": ContactLaw(0.0, 1.0), "gated_again": ContactLaw(0.0, 1.0)}')
     ],
     "report/figures/style.py": [

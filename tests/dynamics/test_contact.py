@@ -8,7 +8,7 @@ import pytest
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import normal_force, normal_slopes
 from stiffdice.dynamics.state import physics_of
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 

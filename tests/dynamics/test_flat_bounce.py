@@ -15,7 +15,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.state import physics_of
 from stiffdice.errors import InputError
 from stiffdice.scene import flat_landing
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 

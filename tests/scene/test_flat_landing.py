@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stiffdice.integrators.exact.oscillator import Oscillator, after
 from stiffdice.scene import flat_landing
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 

@@ -18,7 +18,7 @@ from stiffdice.errors import InputError
 from stiffdice.integrators.registry import LAGS
 from stiffdice.io.reader import open_file
 from stiffdice.io.writer import write_dataset
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping, load
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.dataset import run_dataset

@@ -16,7 +16,7 @@ from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.errors import InputError
 from stiffdice.integrators.registry import SCHEMES
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import PRESETS
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.criteria.registry import CRITERIA

@@ -12,7 +12,7 @@ import pytest
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.integrators.registry import SCHEMES
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines.registry import ENGINES

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.errors import InputError
 from stiffdice.scene.cube import SIGNS
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]

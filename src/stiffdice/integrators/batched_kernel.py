@@ -34,7 +34,7 @@ from stiffdice.scene.scene import Scene
 
 
 class Numbers(NamedTuple):
-    """What a step needs to know, SI units; onset: of the contact law; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h·gravity."""
+    """What a step needs to know, SI units; onset: of the law; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h g."""
 
     h: float
     stiffness: float

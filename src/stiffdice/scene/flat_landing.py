@@ -18,8 +18,23 @@ the cube falls: ζ_in = 2ζ.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from stiffdice.scene.ground import CONTACT_LAWS
+
+class ContactLaw(NamedTuple):
+    """When a node at a depth d, moving outwards at u, feels the ground's max(0, S max(0, d) − D u).
+
+    onset [m]: the depth beyond which it does. approach_damping [1]: how many times as strong the damping of a flat
+    cube, nodes above the ground included, is on the way in as on the way out.
+    """
+
+    onset: float
+    approach_damping: float
+
+
+# ungated: the law of the listings, damping and friction act in mid-air, too. gated: that of the paper's section 4.2,
+# only a node below the ground feels it.
+CONTACT_LAWS = {"ungated": ContactLaw(-math.inf, 2.0), "gated": ContactLaw(0.0, 1.0)}
 
 
 def leg(zeta: float) -> float:

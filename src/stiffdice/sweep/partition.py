@@ -26,7 +26,7 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.sweep import cost_model
 from stiffdice.sweep.grid import Piece, Sweep
 

@@ -19,7 +19,7 @@ from stiffdice.errors import InputError
 from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.sweep.grid import Column, Piece, Sweep
 from stiffdice.sweep.shard import Known, differing, shard_pattern
 

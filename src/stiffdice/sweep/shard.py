@@ -16,7 +16,7 @@ from stiffdice.errors import RefusedError
 from stiffdice.io import schema
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import backend, dataset
 from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.initial_conditions import phased, turned

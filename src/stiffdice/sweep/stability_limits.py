@@ -21,7 +21,7 @@ from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.io import schema
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 # What a scan has edges of, and the numbers of a power law through an edge (`io.schema`).
 EDGES = ("first_pass", "last_fail", "steps_needed")

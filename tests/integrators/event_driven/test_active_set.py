@@ -9,7 +9,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.integrators.event_driven import active_set
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 
 RANDOM = np.random.default_rng(5)

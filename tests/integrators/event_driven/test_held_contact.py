@@ -8,7 +8,7 @@ from tests.integrators.event_driven.test_active_set import begun, landing, rate_
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.integrators.event_driven import active_set, held_contact
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 
 @njit(cache=True)

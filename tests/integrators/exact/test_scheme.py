@@ -22,7 +22,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.exact import regularised_friction
 from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, response
 from stiffdice.scene.cube import Cube
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.run import simulate

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import xarray as xr
 
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.simulation.dataset import AXES
