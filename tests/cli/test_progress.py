@@ -6,6 +6,7 @@ import time
 import pytest
 
 from stiffdice.cli import progress
+from stiffdice.dynamics import kernel_cache
 
 
 @pytest.fixture
@@ -39,3 +40,11 @@ def test_what_takes_long_is_said_once(monkeypatch, capsys, quiet, told):
     with progress.notes("stiffdice: planning the sweeps of x"):
         time.sleep(0.2)
     assert capsys.readouterr().err == told
+
+
+def test_compiling_is_said_once(capsys):
+    with progress.progress("event"):
+        tell = kernel_cache._TELLING.get()
+        tell(), tell()
+    assert capsys.readouterr().err == "compiling the kernels of event, once; about 12 s\n"
+    assert kernel_cache._TELLING.get() is None

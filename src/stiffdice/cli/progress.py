@@ -7,8 +7,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 
 QUIET_SECONDS = 2.0
+_COMPILING = {"event": 12.0}  # s of one core of docs/speed.md; any other scheme takes about as long as the next
 
 
 class _Line:
@@ -28,8 +30,13 @@ class _Line:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[float], None]]:
-    """Give a function that shows the fraction done: every ten seconds, on a terminal five times a second."""
+def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
+    """Give a function that shows the fraction done: every ten seconds, on a terminal five times a second.
+
+    Compiling is said once, and about how long it takes by the scheme, if there is one.
+    """
+    from stiffdice.dynamics.kernel_cache import telling
+
     line, next_time = _Line(), time.monotonic() + QUIET_SECONDS
     first: tuple[float, float] | None = None  # when the first part was done, compilation and all
 
@@ -43,8 +50,14 @@ def progress() -> Iterator[Callable[[float], None]]:
             left = (now - since) * (1 - fraction) / (fraction - before)
             line.say(f"{fraction:6.1%} done, about {left:.0f} s left")
 
+    @cache
+    def compiles() -> None:
+        kernels = f"the kernels of {scheme}" if scheme else "kernels"
+        line.say(f"compiling {kernels}, once; about {_COMPILING.get(scheme, 5.0):.0f} s")
+
     try:
-        yield show
+        with telling(compiles):
+            yield show
     finally:
         line.clear()
 

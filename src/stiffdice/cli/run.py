@@ -84,7 +84,7 @@ def call(options: argparse.Namespace) -> None:
     budget = None if options.budget is None else common.whole("--budget", options.budget)
     for line in run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps):
         print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
-    with progress() as show:
+    with progress(setup.scheme if setup.ours else "") as show:
         run = simulate(
             scene,
             model=options.model,

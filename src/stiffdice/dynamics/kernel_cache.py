@@ -35,6 +35,19 @@ def only_stored() -> Iterator[None]:
         _LOADING.reset(token)
 
 
+_TELLING: ContextVar[Callable[[], None] | None] = ContextVar("_TELLING", default=None)
+
+
+@contextmanager
+def telling(compiles: Callable[[], None]) -> Iterator[None]:
+    """Call a function before a kernel is compiled in the block."""
+    token = _TELLING.set(compiles)
+    try:
+        yield
+    finally:
+        _TELLING.reset(token)
+
+
 class KernelFiles:
     """The kernels of one function, a file for each signature and processor: SHA-256, then key and kernel, pickled.
 
@@ -104,6 +117,8 @@ class KernelCache(FunctionCache):
         found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         if found is None and _LOADING.get():
             raise NotStoredError
+        if found is None and (compiles := _TELLING.get()) is not None:
+            compiles()
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
