@@ -193,7 +193,7 @@ def njit(*function: Any, **options: Any) -> Any:
         if not cached:
             bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
             return _Part(python, targetoptions=bare, pipeline_class=_PartCompiler)
-        kernel = _Kernel(python, targetoptions=options)
+        kernel = _Kernel(python, targetoptions=options | {"no_cfunc_wrapper": True})
         kernel._cache = KernelCache(python)
         return kernel
 
