@@ -18,7 +18,6 @@ FURTHER = {
     "dynamics/models/free_flight": ["integrators/test_registry.py"],
     "dynamics/vector": ["dynamics/models/test_tumbling.py"],
     "integrators/exact/oscillator": ["integrators/exact/test_scheme.py"],
-    "integrators/exact/regularised_friction": ["integrators/exact/test_scheme.py"],
     "integrators/forward_euler": ["integrators/test_registry.py"],
     "integrators/free_flight": ["integrators/test_registry.py"],
     "integrators/member_block": ["integrators/test_batched_kernel.py"],

@@ -27,10 +27,8 @@ from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 
-DEAD = 1e150  # past this damping ratio squares leave the range of doubles, and next to none of the speed is left
 
-
-@njit
+@njit(cache=True)
 def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> float:
     """Return the speed [m/s] at which a flat cube leaves the ground that it met at `speed_in` [m/s]; 0 if it stays.
 
@@ -46,23 +44,15 @@ def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> f
     zeta = physics.damping / math.sqrt(physics.stiffness) / math.sqrt(physics.mass)
     if zeta == 0.0:
         return speed_in
-    if zeta > DEAD:
+    if zeta > 1e150:  # squares leave the range of doubles, and next to none of the speed is left
         return 0.0
-    # In units of the larger of the two speeds neither these nor their squares overflow, and the small one is precise.
+    # In units of the larger of the two speeds neither these nor their squares overflow, and the small one is precise;
+    # start and weight are a and b.
     ratio = pull / omega / speed_in
     if ratio < 1.0:
         unit, start, weight = speed_in, 1.0, ratio
     else:
         unit, start, weight = pull / omega, 1.0 / ratio, 1.0
-    square = _rebound_squared(law, zeta, start, weight)
-    if square <= 0.0:
-        return 0.0
-    return min(unit * math.sqrt(square), speed_in)
-
-
-@njit
-def _rebound_squared(law: Any, zeta: float, start: float, weight: float) -> float:
-    """Return the square of the speed at lift-off, not positive if there is none; start and weight are a and b."""
     zeta_in = approach_damping(law) * zeta
     brake = zeta * weight
     decay_in = 2.0 * zeta_in * _duration(zeta_in, weight, start)
@@ -74,7 +64,8 @@ def _rebound_squared(law: Any, zeta: float, start: float, weight: float) -> floa
     while lower < u:
         u = lower
         lower = brake + math.sqrt(brake * brake + _swing(zeta, zeta_in, start, weight, decay_in, weight, u))
-    return lower * (lower - 4.0 * brake)
+    square = lower * (lower - 4.0 * brake)
+    return 0.0 if square <= 0.0 else min(unit * math.sqrt(square), speed_in)
 
 
 @njit
@@ -109,9 +100,4 @@ def restitution(scene: Scene, speed_in: float) -> float:
     upward = scene.ground.normal[2]
     if upward < 0:
         raise InputError(f"ground.normal[z] = {upward:g}: a bounce is known for a number >= 0")
-    return float(_rebound_speed(LAWS[scene.ground.contact], physics_of(scene), scene.gravity * upward, speed) / speed)
-
-
-@njit(cache=True)
-def _rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> float:
-    return rebound_speed(law, physics, pull, speed_in)
+    return float(rebound_speed(LAWS[scene.ground.contact], physics_of(scene), scene.gravity * upward, speed) / speed)

@@ -18,7 +18,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils as _cgutils
 from numba.core.typing.templates import AbstractTemplate
 from numba.core.typing.templates import infer_global as _infer_global
 from numba.extending import intrinsic as _intrinsic
@@ -29,7 +28,6 @@ from numba.extending import models, register_model
 infer_global: Any = _infer_global
 intrinsic: Any = _intrinsic
 lower_builtin: Any = _lower_builtin
-cgutils: Any = _cgutils
 
 _DOUBLE = ir.DoubleType()
 
@@ -105,9 +103,8 @@ def _call(name: str) -> Callable[..., Any]:
 
     def build(builder: Any, vector: Any) -> Any:
         kind = ir.FunctionType(vector.type, [vector.type])
-        return builder.call(
-            cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{vector.type.count}f64"), [vector]
-        )
+        whole = f"llvm.{name}.v{vector.type.count}f64"
+        return builder.call(builder.module.declare_intrinsic(whole, (), kind), [vector])
 
     return build
 

@@ -19,8 +19,7 @@ from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
+from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of, rotated
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers
 from stiffdice.experiments.placement import level

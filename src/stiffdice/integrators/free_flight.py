@@ -37,16 +37,6 @@ def landing(pull: Any, clearance: float, speed: float) -> float:
     return (speed + math.sqrt(square)) / pull if pull > 0.0 else math.inf
 
 
-def lagging(lag: float) -> Any:
-    """Return `flight` of schemes of one lag [steps], for compiled code."""
-
-    @njit
-    def flown(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-        flight(model, physics, state, h, steps, lag)
-
-    return flown
-
-
 @njit
 def scaled(a: Any, factor: float) -> Motion:
     """Return factor·a."""

@@ -26,30 +26,27 @@ from stiffdice.dynamics import contact
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
-from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, unit, vector
+from stiffdice.dynamics.vector import Vector, cross, factorise, norm, plus, row, solve, unit, vector
 from stiffdice.integrators.free_flight import scaled
-from stiffdice.integrators.linear_equations import factorise, solve
 
 ImplicitEuler = namedtuple("ImplicitEuler", ())
 TAG = ImplicitEuler()
 FORMULA = "(M - h dF/dv - h^2 dF/dx) dv = h (F + h dF/dx v), F linear about x + h v; v += dv; x += h v"
 LAG = 0.5  # the velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n
 
-_EVERY_NODE = -1  # in bits
-
 
 @njit
 def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     weight = 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    height = contact.height_of(physics, state) + h * (
-        contact.speed_of(physics, state) - h * physics.gravity * physics.nz
-    )
-    if not contact.reaches(law, height - physics.reach):
+    speed = contact.speed_of(physics, state) - h * physics.gravity * physics.nz
+    if not contact.reaches(law, contact.height_of(physics, state) + h * speed - physics.reach):
         models.kick(model, physics, state, weight, h)
         models.drift(model, physics, state, h)
         return 1
-    slips = _slips(physics, state)
+    slips = np.empty(state.node_offset.shape[0])  # of each node [m/s]: its speed along the ground, cutoff added
+    for k in range(slips.shape[0]):
+        slips[k] = norm(contact.split(physics, contact.node_velocity(state, k))[1]) + physics.cutoff
     models.kick(model, physics, state, weight, h)
     models.drift(model, physics, state, h)
     change = _solved(model, law, physics, state, slips, h)
@@ -61,21 +58,12 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
 
 
 @njit
-def _slips(physics: Physics, state: Any) -> Array:
-    """Return each node's speed along the ground, cutoff added, shape (node,) [m/s]."""
-    slips = np.empty(state.node_offset.shape[0])
-    for k in range(slips.shape[0]):
-        slips[k] = norm(contact.split(physics, contact.node_velocity(state, k))[1]) + physics.cutoff
-    return slips
-
-
-@njit
 def _solved(model: Any, law: Any, physics: Physics, state: Any, slips: Array, h: float) -> Array:
     """Return by how much the ground changes velocity and spin from those of free flight, shape (6,)."""
     size = 6 if models.turns(model) else 3
     change = np.zeros(6)
     system = np.empty((size, size + 1))
-    pressing = _EVERY_NODE
+    pressing = -1  # every node, in bits
     while True:
         still = _assemble(law, physics, state, slips, pressing, False, change, system, h)
         if still == pressing:
@@ -90,19 +78,11 @@ def _solved(model: Any, law: Any, physics: Physics, state: Any, slips: Array, h:
 
 @njit
 def _assemble(
-    law: Any,
-    physics: Physics,
-    state: Any,
-    slips: Array,
-    nodes: int,
-    rubbing: bool,
-    change: Array,
-    system: Array,
-    h: float,
+    law: Any, physics: Physics, state: Any, slips: Array, nodes: int, rubs: bool, change: Array, system: Array, h: float
 ) -> int:
     """Write down the equations of those of these nodes that press after `change`, and return which they are, in bits.
 
-    rubbing: with friction by the normal forces after `change`.
+    rubs: with friction by the normal forces after `change`.
     """
     system[:] = 0.0
     for k in range(system.shape[0]):
@@ -116,12 +96,15 @@ def _assemble(
         by_depth, by_speed = contact.normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
         stiffening = h * by_depth - by_speed
         along = _lever(arm, contact.normal_of(physics))
-        pressed = push - stiffening * _dot(along, change)
+        changed = 0.0  # the velocity of the node
+        for axis in range(6):
+            changed += along[axis] * change[axis]
+        pressed = push - stiffening * changed
         if (nodes >> k) & 1 == 0 or pressed <= 0.0:
             continue
         pressing |= 1 << k
         _add(system, along, h * stiffening, h * push)
-        if rubbing:
+        if rubs:
             grip = h * physics.friction * pressed / slips[k]
             _add(system, _lever(arm, slip), 0.0, -grip)
             for axis in range(3):
@@ -138,15 +121,6 @@ def _lever(arm: Vector, force: Vector) -> Motion:
 
 
 @njit
-def _dot(along: Motion, change: Array) -> float:
-    """Return the velocity of a node along its lever's force in a change of motion."""
-    total = 0.0
-    for k in range(6):
-        total += along[k] * change[k]
-    return total
-
-
-@njit
 def _add(system: Array, along: Motion, resistance: float, impulse: float) -> None:
     """Add resistance·along alongᵀ to the matrix and impulse·along to the right-hand side."""
     size = system.shape[0]
@@ -160,7 +134,6 @@ def _add(system: Array, along: Motion, resistance: float, impulse: float) -> Non
 def _solve(system: Array, change: Array) -> None:
     """Solve the equations, shape (n, n + 1), of which the last column is the right side."""
     size = system.shape[0]
-    for k in range(size):
-        change[k] = system[k, size]
+    change[:size] = system[:, size]
     factorise(system)
     solve(system, change)

@@ -98,8 +98,14 @@ step = _chosen(_step_of)
 # by one step, or by a part of it; `sight.pending` is what is left of it then [s], and `sight.work` what was done.
 one = _chosen(_one_of)
 
-# (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
-flight = _chosen(lambda module: free_flight.lagging(module.LAG))
+_lag = _chosen(lambda module: constant(module.LAG))
+
+
+@njit
+def flight(scheme: Any, model: Any, physics: Any, state: Any, h: float, steps: int) -> None:
+    """Take so many steps of free flight at once, as stepping would to round-off."""
+    free_flight.flight(model, physics, state, h, steps, _lag(scheme))
+
 
 # (scheme, place, speed, h, steps, square, rate, constant) -> the change of place and the new speed after so many steps
 # at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off; both

@@ -11,8 +11,7 @@ import math
 
 import numpy as np
 
-from stiffdice.dynamics.rotation import along, rotated
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, Ensemble, States, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, Ensemble, States, along, rotated, start_of
 from stiffdice.errors import InputError
 from stiffdice.scene.scene import Scene
 

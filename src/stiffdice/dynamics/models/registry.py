@@ -1,6 +1,6 @@
 """Which motion is computed. A model is a module with TAG, `force`, `kick` and `drift`; one line registers it.
 
-What turns the cube, and what the ground touches, is said in `state.py`.
+What turns the cube, and what the ground touches, is said in `state.py`. The force is that of a cube near the ground.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
-from stiffdice.dynamics.contact import lowest_of
+from stiffdice.dynamics.contact import Wrench, height_of, lowest_of, reaches
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
 from stiffdice.dynamics.state import TOUCHING, TURNING, Motion, Physics
 from stiffdice.dynamics.vector import norm, vector
@@ -28,8 +28,6 @@ def _chosen(part: str) -> Callable[..., Any]:
     return by_tag({type(module.TAG): getattr(module, part) for module in _MODULES.values()})
 
 
-# (model, law, physics, state) -> force [N] and torque [N m] on the body in this state.
-force = _chosen("force")
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
 kick = _chosen("kick")
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
@@ -37,6 +35,16 @@ drift = _chosen("drift")
 # (model) -> whether the body turns; whether the ground can act on it.
 turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
+# (model, law, physics, state) -> force [N] and torque [N m] on the body near the ground.
+_near = _chosen("force")
+
+
+@njit
+def force(model: Any, law: Any, physics: Physics, state: Any) -> Wrench:
+    """Return force [N] and torque [N m] on the body in this state."""
+    if touches(model) and reaches(law, height_of(physics, state) - physics.reach):
+        return _near(model, law, physics, state)
+    return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
 
 
 @njit

@@ -10,7 +10,7 @@ from collections import namedtuple
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import Wrench, normal_force, reaches
+from stiffdice.dynamics.contact import Wrench, normal_force
 from stiffdice.dynamics.state import Physics
 
 Vertical = namedtuple("Vertical", ())
@@ -21,10 +21,7 @@ TAG = Vertical()
 def force(law: Any, physics: Physics, state: Any) -> Wrench:
     """Return the normal forces and the weight [N]; friction and torque are left out."""
     z, speed = state.position[2], state.velocity[2]
-    if not reaches(law, z - physics.reach):
-        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    nodes = state.node_offset
-    fz = 0.0
+    nodes, fz = state.node_offset, 0.0
     for k in range(nodes.shape[0]):
         fz += normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping) - physics.node_weight
     return 0.0, 0.0, fz, 0.0, 0.0, 0.0

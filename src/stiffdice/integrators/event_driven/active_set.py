@@ -147,7 +147,16 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
     physics = contact.physics
     height, centre_speed = upward(physics, part_of(motion, 0)), upward(physics, part_of(motion, 3))
     centre_gain = upward(physics, part_of(rate, 3))
-    level, turn, bend = _normals(contact, motion, rate)
+    # Three vectors of which the products with a node, not turned yet, are its level, speed and acceleration along the
+    # normal n, relative to the centre; turned back, n, n × ω and n × α + (n·ω) ω − ω² n: for n·(ω × r) = (n × ω)·r,
+    # and n·(ω × (ω × r)) = (n·ω)(ω·r) − ω² n·r.
+    n, none = normal_of(physics), Vector(0.0, 0.0, 0.0)
+    level, turn, bend = n, none, none
+    if contact.turning:
+        spin = spin_of(physics, motion)
+        bend = plus_times(cross(n, spin_of(physics, rate)), dot(n, spin), spin)
+        bend = _turned(motion, -1.0, plus_times(bend, -dot(spin, spin), n))
+        level, turn = _turned(motion, -1.0, n), _turned(motion, -1.0, cross(n, spin))
     for k in range(NODES):
         node = row(contact.regime.nodes, k)
         clearance = height + level.x * node.x + level.y * node.y + level.z * node.z
@@ -164,22 +173,6 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
             change -= physics.stiffness * speed
         pushed = contact.regime.bits[k] & PUSHED != 0
         value[2 * k + 1], slope[2 * k + 1] = (push, change) if pushed else (-push, -change)
-
-
-@njit
-def _normals(contact: Contact, motion: Any, rate: Any) -> tuple[Vector, Vector, Vector]:
-    """Return three vectors of which the products with a node, not turned yet, are its level, speed and acceleration.
-
-    They are along the normal n and relative to the centre; turned back, n, n × ω and n × α + (n·ω) ω − ω² n: for
-    n·(ω × r) = (n × ω)·r, and n·(ω × (ω × r)) = (n·ω)(ω·r) − ω² n·r.
-    """
-    n, none = normal_of(contact.physics), Vector(0.0, 0.0, 0.0)
-    if not contact.turning:
-        return n, none, none
-    spin = spin_of(contact.physics, motion)
-    bend = plus_times(cross(n, spin_of(contact.physics, rate)), dot(n, spin), spin)
-    bend = plus_times(bend, -dot(spin, spin), n)
-    return _turned(motion, -1.0, n), _turned(motion, -1.0, cross(n, spin)), _turned(motion, -1.0, bend)
 
 
 @njit

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States, along
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
 from stiffdice.simulation.backend import Setup

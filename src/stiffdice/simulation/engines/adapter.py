@@ -8,8 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiffdice.dynamics.rotation import matrices, turned
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, matrices, start_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 
@@ -103,7 +102,7 @@ class RigidBody(Engine):
         if self.turns:
             quaternions, spins = turning
             states["angular_velocity"], states["angular_momentum"] = spins, self.inertia * spins
-            states["node_offset"] = turned(matrices(quaternions), self.start["node_offset"])
+            states["node_offset"] = self.start["node_offset"] @ np.swapaxes(matrices(quaternions), 1, 2)
 
 
 def _touches(scene: Scene, model: str) -> bool:

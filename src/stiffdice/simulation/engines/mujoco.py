@@ -27,8 +27,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from stiffdice.dynamics.rotation import matrices
-from stiffdice.dynamics.state import TOUCHING, Array, States
+from stiffdice.dynamics.state import TOUCHING, Array, States, matrices
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import RigidBody
 
