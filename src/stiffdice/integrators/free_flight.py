@@ -7,6 +7,7 @@ from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
+from stiffdice.dynamics.models import tumbling
 from stiffdice.dynamics.state import Motion, Physics
 
 
@@ -22,7 +23,8 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int, lag: 
     state.position[1] += time * state.velocity[1]
     state.position[2] += time * (state.velocity[2] + fall * ((time + 2 * lag * h) / 2))
     state.velocity[2] += fall * time
-    models.turn(model, physics, state, time)
+    if models.turns(model):
+        tumbling.turn(physics, state, time)
 
 
 @njit

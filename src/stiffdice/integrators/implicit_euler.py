@@ -49,20 +49,8 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
         slips[k] = norm(contact.split(physics, contact.node_velocity(state, k))[1]) + physics.cutoff
     models.kick(model, physics, state, weight, h)
     models.drift(model, physics, state, h)
-    change = _solved(model, law, physics, state, slips, h)
-    models.move(model, state, scaled(change, h))
-    m, i = physics.mass, physics.inertia
-    impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
-    models.kick(model, physics, state, impulse, 1.0)
-    return 1
-
-
-@njit
-def _solved(model: Any, law: Any, physics: Physics, state: Any, slips: Array, h: float) -> Array:
-    """Return by how much the ground changes velocity and spin from those of free flight, shape (6,)."""
     size = 6 if models.turns(model) else 3
-    change = np.zeros(6)
-    system = np.empty((size, size + 1))
+    change, system = np.zeros(6), np.empty((size, size + 1))  # of velocity and spin, by the ground
     pressing = -1  # every node, in bits
     while True:
         still = _assemble(law, physics, state, slips, pressing, False, change, system, h)
@@ -73,7 +61,11 @@ def _solved(model: Any, law: Any, physics: Physics, state: Any, slips: Array, h:
     if pressing != 0 and physics.friction > 0.0:
         _assemble(law, physics, state, slips, pressing, True, change, system, h)
         _solve(system, change)
-    return change
+    models.move(model, state, scaled(change, h))
+    m, i = physics.mass, physics.inertia
+    impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
+    models.kick(model, physics, state, impulse, 1.0)
+    return 1
 
 
 @njit

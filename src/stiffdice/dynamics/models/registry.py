@@ -11,7 +11,7 @@ from typing import Any
 from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.contact import Wrench, height_of, lowest_of, reaches
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
-from stiffdice.dynamics.state import TOUCHING, TURNING, Motion, Physics
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics
 from stiffdice.dynamics.vector import norm, vector
 
 _MODULES: dict[str, Any] = {
@@ -45,23 +45,6 @@ def force(model: Any, law: Any, physics: Physics, state: Any) -> Wrench:
     if touches(model) and reaches(law, height_of(physics, state) - physics.reach):
         return _near(model, law, physics, state)
     return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-
-
-@njit
-def turn(model: Any, physics: Physics, state: Any, duration: float) -> None:
-    """Turn the body at its present spin for so long [s], as in a free flight."""
-    if turns(model):
-        tumbling.turn(physics, state, duration)
-
-
-@njit
-def motion(model: Any, physics: Physics, state: Any) -> Motion:
-    """Return the velocity [m/s] and the spin [rad/s] at which place and orientation change."""
-    ux, uy, uz = vector(state.velocity)
-    if not turns(model):
-        return ux, uy, uz, 0.0, 0.0, 0.0
-    lx, ly, lz = vector(state.angular_momentum)
-    return ux, uy, uz, lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
 
 
 @njit
