@@ -47,9 +47,10 @@ class Contact(NamedTuple):
 
 
 class Node(NamedTuple):
-    """arm [m]: place relative to the centre; clearance [m]; speed along the normal and slip along the ground [m/s]."""
+    """arm [m]: place relative to the centre; clearance [m]; velocity [m/s]: speed along the normal, slip aside."""
 
     arm: Vector
+    velocity: Vector
     clearance: float
     speed: float
     slip: Vector
@@ -83,21 +84,15 @@ def _turned(motion: Any, sense: float, v: Vector) -> Vector:
 
 
 @njit
-def _arm_and_velocity(contact: Contact, motion: Any, k: int) -> tuple[Vector, Vector]:
-    """Return place relative to the centre [m] and velocity [m/s] of node k."""
+def node_of(contact: Contact, motion: Any, k: int) -> Node:
+    """Return where node k is, and how it moves."""
     arm, velocity = row(contact.regime.nodes, k), part_of(motion, 3)
     if contact.turning:
         arm = _turned(motion, 1.0, arm)
         velocity = plus(velocity, cross(spin_of(contact.physics, motion), arm))
-    return arm, velocity
-
-
-@njit
-def node_of(contact: Contact, motion: Any, k: int) -> Node:
-    """Return where node k is, and how it moves."""
-    arm, velocity = _arm_and_velocity(contact, motion, k)
     height, n = upward(contact.physics, part_of(motion, 0)), normal_of(contact.physics)
-    return Node(arm, height + n.x * arm.x + n.y * arm.y + n.z * arm.z, *split(contact.physics, velocity))
+    clearance = height + n.x * arm.x + n.y * arm.y + n.z * arm.z
+    return Node(arm, velocity, clearance, *split(contact.physics, velocity))
 
 
 @njit
@@ -271,8 +266,9 @@ def hardness(contact: Contact, motion: Any, hard: Any) -> None:
     for k in range(NODES):
         if bits[k] == 0:
             continue
-        arm, velocity = _arm_and_velocity(contact, motion, k)
-        level, speed, reach = upward(physics, arm), upward(physics, velocity), dot(arm, arm)
+        node = node_of(contact, motion, k)
+        arm, velocity, speed = node.arm, node.velocity, node.speed
+        level, reach = upward(physics, arm), dot(arm, arm)
         along = pliancy + (reach - level * level) / physics.inertia if contact.turning else pliancy
         across = pliancy + reach / physics.inertia if contact.turning else pliancy
         push = -physics.damping * speed
