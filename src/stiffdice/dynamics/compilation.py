@@ -211,12 +211,7 @@ def njit(function: Any = None, **options: Any) -> Any:
 
 def constant(value: Any) -> Any:
     """Return a function, for compiled code only, that returns a value whatever its arguments."""
-
-    @njit
-    def body(*arguments: Any) -> Any:
-        return value
-
-    return body
+    return njit(lambda *arguments: value)
 
 
 def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:

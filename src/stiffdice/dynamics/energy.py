@@ -57,13 +57,12 @@ def elastic(physics: Physics, state: Any) -> float:
 @njit(cache=True)
 def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
     """Return kinetic, potential and elastic energy [J] of each state, shape (state,) each."""
-    count = states.shape[0]
-    result = np.empty(count), np.empty(count), np.empty(count)
+    count = len(states)
+    moving, high, pressed = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
-        result[0][k] = kinetic(physics, states[k])
-        result[1][k] = potential(physics, states[k])
-        result[2][k] = elastic(physics, states[k])
-    return result
+        state = states[k]
+        moving[k], high[k], pressed[k] = kinetic(physics, state), potential(physics, state), elastic(physics, state)
+    return moving, high, pressed
 
 
 @njit(cache=True)

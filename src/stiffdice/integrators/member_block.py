@@ -45,11 +45,7 @@ ABREAST: dict[str, Any] = {"vertical": ThirtyTwo(), "sliding": ThirtyTwo(), "tum
 
 
 def _row_of(width: int) -> Any:
-    @inlined
-    def row_of(block: Array, row: int) -> Any:
-        return load(block, row, width)
-
-    return row_of
+    return inlined(lambda block, row: load(block, row, width))
 
 
 # (width, block, row) -> a row of a block.
