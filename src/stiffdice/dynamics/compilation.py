@@ -6,8 +6,6 @@ versions that compile them. Each file in it begins with its own digest, and is k
 what does not match is compiled again.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import inspect
@@ -133,7 +131,7 @@ class _Locator(UserProvidedCacheLocator):
     """The folder chosen above, and no other: the others that numba tries would serve stale kernels."""
 
     @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator:
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
         return cls(py_func, py_file)
 
 

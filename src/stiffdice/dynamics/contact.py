@@ -5,8 +5,6 @@ ground, are in `scene/flat_landing.py`. The force is linear in depth and speed w
 (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any

@@ -2,8 +2,6 @@
 steps that resolve both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache
