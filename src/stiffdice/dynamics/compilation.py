@@ -66,9 +66,8 @@ def _is_made(folder: Path) -> bool:
 
 
 # In the environment for child processes and for numba to find when it reads it again.
-_FOLDER = str(_cache_folder())
-os.environ["NUMBA_CACHE_DIR"] = _FOLDER
-setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())
+setattr(numba.config, "CACHE_DIR", os.environ["NUMBA_CACHE_DIR"])  # noqa: B010 (mypy knows no such attribute)
 
 _DIGEST = hashlib.sha256().digest_size
 _LOADING: ContextVar[bool] = ContextVar("_LOADING", default=False)

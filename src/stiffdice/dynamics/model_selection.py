@@ -44,7 +44,10 @@ def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
     longest_step [s]: of the runs it is for. A scheme's flight may leave the parabola by what gravity adds in a step to
     the speed, and members fly on for up to a step; only a flight that clears the ground even so is `flying`.
     """
-    ground, clear, straight = scene.ground, _clears(scene, longest_step), _moves_straight(scene)
+    ground, clear, speed = scene.ground, _clears(scene, longest_step), _along(scene, scene.launch.velocity)
+    # Exactly nothing moves it along the ground: the friction of a sliding speed of round-off is above round-off.
+    sliding = any(part - speed * along for part, along in zip(scene.launch.velocity, ground.normal, strict=True))
+    straight = not sliding and not (scene.gravity > 0 and (ground.normal[0] != 0 or ground.normal[1] != 0))
     if ground.stiffness == 0 and ground.damping == 0:
         name, reason = "flying", "ground without stiffness and damping does nothing to the cube"
     elif clear and (ground.contact == "gated" or ground.damping == 0):
@@ -138,17 +141,6 @@ def _recedes(scene: Scene, longest_step: float) -> bool:
     # Along the normal n a node at r moves by n·(ω × r) = r·(n × ω).
     turning = math.hypot(*np.cross(scene.ground.normal, spin).tolist()) / physics.inertia * physics.reach
     return slowest >= turning
-
-
-def _moves_straight(scene: Scene) -> bool:
-    """Return whether nothing ever moves a cube without spin along the ground: no velocity, and no part of gravity.
-
-    Exactly nothing: the friction of a sliding speed of round-off is that over the cutoff, and above round-off.
-    """
-    normal, speed = scene.ground.normal, _along(scene, scene.launch.velocity)
-    sliding = any(part - speed * along for part, along in zip(scene.launch.velocity, normal, strict=True))
-    sloping = scene.gravity > 0 and (normal[0] != 0 or normal[1] != 0)
-    return not sliding and not sloping
 
 
 def _stays_above(scene: Scene) -> bool:
