@@ -7,6 +7,7 @@ what does not match is compiled again.
 """
 
 import contextlib
+import gc
 import hashlib
 import inspect
 import os
@@ -23,10 +24,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import serialize
+from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, serialize, typed_passes
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
-from numba.core.registry import CPUDispatcher
-from numba.extending import overload
 
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.errors import OutputError
@@ -163,12 +162,43 @@ class _KernelCache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-class _Part(CPUDispatcher):
-    """A compiled function that is meant for compiled code, without the wrappers for calls from Python.
+# Of these numba has no types.
+_Library: Any = codegen.JITCodeLibrary
+_Lowering: Any = typed_passes.NativeLowering
+_Compiler: Any = compiler.Compiler
+_Dispatcher: Any = registry.CPUDispatcher
+_FunctionCompiler: Any = vars(dispatcher)["_FunctionCompiler"]
+_register_pass: Any = compiler_machinery.register_pass
 
-    They are a third of all time to compile. Who does call it from Python, a test, say, has one made for the call;
+
+class _Kernel(_Dispatcher):  # type: ignore[misc]
+    """A compiled function that Python calls."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, or load what is stored; garbage is left, as most of what that makes stays."""
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if enabled:
+                gc.enable()
+
+
+class _Part(_Dispatcher):  # type: ignore[misc]
+    """A compiled function that is meant for compiled code, without machine code and wrappers for calls from Python.
+
+    They are half of all time to compile. Who does call it from Python, a test, say, has a kernel made for the call;
     numba's own would jump to nowhere.
     """
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature; what calls for it holds numba's lock, and is what numba times."""
+        arguments = tuple(sig)
+        if arguments not in self.overloads:
+            with self._compiling_counter:
+                self.add_overload(self._compiler.compile(arguments, None))
+        return self.overloads[arguments].entry_point
 
     def add_overload(self, cres: Any) -> None:
         """Keep what was compiled for compiled code to find, and for nobody else."""
@@ -177,6 +207,42 @@ class _Part(CPUDispatcher):
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         bound = inspect.signature(self.py_func).bind(*arguments, **named)
         return _callable(self)(*bound.args)
+
+
+class _PartLibrary(_Library):  # type: ignore[misc]
+    """LLVM code of a part: optimised and turned into machine code with the kernel that takes it in, not before."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@_register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(_Lowering):  # type: ignore[misc]
+    def run_pass(self, state: Any) -> bool:
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        entry = object()  # by which what calls the part finds it
+        state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
+        state["cr"] = state["cr"]._replace(cfunc=entry)
+        return True
+
+
+class _PartCompiler(_Compiler):  # type: ignore[misc]
+    def define_pipelines(self) -> list[Any]:
+        (pipeline,) = super().define_pipelines()
+        pipeline.passes = [
+            (_PartLowering if made is _Lowering else made, description) for made, description in pipeline.passes
+        ]
+        pipeline.finalize()
+        return [pipeline]
 
 
 @cache
@@ -196,12 +262,11 @@ def njit(function: Any = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(njit, **options)
-    options = {"error_model": "numpy", "fastmath": False} | options
+    options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
     if not options.pop("cache", False):
-        wrappers = {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        return _Part(function, targetoptions=options | wrappers)
-    decorate: Any = numba.njit
-    kernel = decorate(function, **options)
+        bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _Part(function, targetoptions=bare, pipeline_class=_PartCompiler)
+    kernel = _Kernel(function, targetoptions=options)
     kernel._cache = _KernelCache(function)
     return kernel
 
@@ -211,21 +276,29 @@ def constant(value: Any) -> Any:
     return njit(lambda *arguments: value)
 
 
-def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:
+class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]
+    """Compiles, for a tag, a call of the body that it stands for."""
+
+    bodies: dict[type, Any]
+
+    def _get_implementation(self, args: Any, kws: Any) -> Any:
+        body = self.bodies[args[0].instance_class]
+        return lambda tag, *arguments: body(*arguments)
+
+
+def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
     """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
-    The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body,
+    The first argument is a tag: an empty named tuple that stands for a model or a scheme. The body,
     which gets the arguments after it, is chosen at compile time, which costs nothing in a loop; unlike functions passed
     as arguments it leaves the kernel cacheable on disk, and unlike string literals it does not slow down every call of
     it (1 µs against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
     """
 
+    @njit(forceinline=inlined)
     def call(tag: Any, *arguments: Any) -> Any:
-        raise TypeError("a kernel's part: call it from compiled code")
+        raise TypeError("chosen by the type of the tag")
 
-    @overload(call, strict=False, jit_options={"forceinline": inlined})
-    def _choose(tag: Any, *arguments: Any) -> Any:
-        body = bodies[tag.instance_class]
-        return lambda tag, *arguments: body(*arguments)
-
+    call._compiler.__class__ = _ChoiceCompiler
+    call._compiler.bodies = bodies
     return call

@@ -19,15 +19,14 @@ import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS, approach_damping
 from stiffdice.dynamics.state import Physics, physics_of
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 
 
-@njit(cache=True)
-def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> float:
+@njit
+def rebound_speed(physics: Physics, pull: float, speed_in: float) -> float:
     """Return the speed [m/s] at which a flat cube leaves the ground that it met at `speed_in` [m/s]; 0 if it stays.
 
     Both speeds are along the normal, at a clearance of zero. pull [m/s²]: of gravity, towards the ground. Where that is
@@ -51,7 +50,7 @@ def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> f
         unit, start, weight = speed_in, 1.0, ratio
     else:
         unit, start, weight = pull / omega, 1.0 / ratio, 1.0
-    zeta_in = approach_damping(law) * zeta
+    zeta_in = physics.approach_damping * zeta
     brake = zeta * weight
     decay_in = 2.0 * zeta_in * _duration(zeta_in, weight, start)
     # At the least u that gets out, 4ζb.
@@ -98,4 +97,9 @@ def restitution(scene: Scene, speed_in: float) -> float:
     upward = scene.ground.normal[2]
     if upward < 0:
         raise InputError(f"ground.normal[z] = {upward:g}: a bounce is known for a number >= 0")
-    return float(rebound_speed(LAWS[scene.ground.contact], physics_of(scene), scene.gravity * upward, speed) / speed)
+    return float(_rebound_speed(physics_of(scene), scene.gravity * upward, speed) / speed)
+
+
+@njit(cache=True)
+def _rebound_speed(physics: Physics, pull: float, speed_in: float) -> float:
+    return rebound_speed(physics, pull, speed_in)

@@ -34,11 +34,11 @@ LAG = 0.5  # the velocity of a step is the path's slope half a step before it: x
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     weight = 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     speed = contact.speed_of(physics, state) - h * physics.gravity * physics.nz
-    if not contact.reaches(law, contact.height_of(physics, state) + h * speed - physics.reach):
+    if not contact.reaches(physics, contact.height_of(physics, state) + h * speed - physics.reach):
         models.kick(model, physics, state, weight, h)
         models.drift(model, physics, state, h)
         return 1
@@ -51,13 +51,13 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     change, system = np.zeros(6), np.empty((size, size + 1))  # of velocity and spin, by the ground
     pressing = -1  # every node, in bits
     while True:
-        still = _assemble(law, physics, state, slips, pressing, False, change, system, h)
+        still = _assemble(physics, state, slips, pressing, False, change, system, h)
         if still == pressing:
             break
         pressing = still
         _solve(system, change)
     if pressing != 0 and physics.friction > 0.0:
-        _assemble(law, physics, state, slips, pressing, True, change, system, h)
+        _assemble(physics, state, slips, pressing, True, change, system, h)
         _solve(system, change)
     models.move(model, state, scaled(change, h))
     m, i = physics.mass, physics.inertia
@@ -68,13 +68,13 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
 
 @njit
 def _assemble(
-    law: Any, physics: Physics, state: Any, slips: Array, nodes: int, rubs: bool, change: Array, system: Array, h: float
+    physics: Physics, state: Any, slips: Array, nodes: int, rubs: bool, change: Array, system: Array, h: float
 ) -> int:
     """Write down the equations of those of these nodes that press after `change`, and return which they are, in bits.
 
     rubs: with friction by the normal forces after `change`.
     """
-    system[:] = 0.0
+    system.fill(0.0)
     for k in range(system.shape[0]):
         system[k, k] = physics.mass if k < 3 else physics.inertia
     pressing = 0
@@ -82,8 +82,8 @@ def _assemble(
         arm = row(state.node_offset, k)
         depth = -contact.upward(physics, plus(vector(state.position), arm))
         speed, slip = contact.split(physics, contact.node_velocity(state, k))
-        push = contact.normal_force(law, depth, speed, physics.stiffness, physics.damping)
-        by_depth, by_speed = contact.normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
+        push = contact.normal_force(physics, depth, speed)
+        by_depth, by_speed = contact.normal_slopes(physics, depth, speed)
         stiffening = h * by_depth - by_speed
         along = _lever(arm, contact.normal_of(physics))
         changed = 0.0  # the velocity of the node
@@ -124,6 +124,7 @@ def _add(system: Array, along: Motion, resistance: float, impulse: float) -> Non
 def _solve(system: Array, change: Array) -> None:
     """Solve the equations, shape (n, n + 1), of which the last column is the right side."""
     size = system.shape[0]
-    change[:size] = system[:, size]
+    for k in range(size):
+        change[k] = system[k, size]
     factorise(system)
     solve(system, change)

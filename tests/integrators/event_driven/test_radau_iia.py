@@ -7,9 +7,9 @@ import pytest
 from tests.integrators.event_driven.test_active_set import begun, landing, rate_of
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import rotated
 from stiffdice.integrators.event_driven import active_set, dop853, radau_iia
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 
 OMEGA = 2 * np.sqrt(1e4)
@@ -115,7 +115,7 @@ def retouch(contact, motion, about):
     return radau_iia.retouch(contact, motion, about)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("times", [1.0, 2.0])
 def test_slopes_are_those_of_the_rates(law, times):
     """Central differences: a change of place and rotation moves the nodes, at the same u and L.

@@ -33,15 +33,15 @@ drift = _chosen("drift")
 # (model) -> whether the body turns; whether the ground can act on it.
 turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
-# (model, law, physics, state) -> force [N] and torque [N m] on the body near the ground.
+# (model, physics, state) -> force [N] and torque [N m] on the body near the ground.
 _near = _chosen("force")
 
 
 @njit
-def force(model: Any, law: Any, physics: Physics, state: Any) -> Wrench:
+def force(model: Any, physics: Physics, state: Any) -> Wrench:
     """Return force [N] and torque [N m] on the body in this state."""
-    if touches(model) and reaches(law, height_of(physics, state) - physics.reach):
-        return _near(model, law, physics, state)
+    if touches(model) and reaches(physics, height_of(physics, state) - physics.reach):
+        return _near(model, physics, state)
     return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
 
 

@@ -18,23 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from stiffdice.dynamics import vector
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import normal_of
 from stiffdice.dynamics.state import Physics
-from stiffdice.dynamics.vector import (
-    Vector,
-    cross,
-    dot,
-    factorise,
-    minus,
-    norm,
-    plus,
-    plus_times,
-    row,
-    solve,
-    times,
-    unit,
-)
+from stiffdice.dynamics.vector import Vector, cross, dot, minus, norm, plus, plus_times, row, times, unit
 from stiffdice.integrators.event_driven import active_set
 from stiffdice.integrators.event_driven.active_set import BELOW, NODES, PUSHED, SIZE, Contact, node_of, push_of, spin_of
 
@@ -84,7 +72,11 @@ def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[
     slips(contact, start, about[0])
     slopes(contact, start, about[0], by_speed[0], by_place[0])
     for stage in range(1, STAGES):
-        about[stage], by_speed[stage], by_place[stage] = about[0], by_speed[0], by_place[0]
+        for node in range(NODES):
+            vector.assign(about[stage, node], about[0, node])
+        for part in range(6):
+            vector.assign(by_speed[stage, part], by_speed[0, part])
+            vector.assign(by_place[stage, part], by_place[0, part])
     _follow(contact, start, h, change, rates, scale)
     correction, last, iteration, fresh, found = 0.0, 0.0, 0, True, False
     # One that wanders off may find other stages, as smooth and as wrong.
@@ -97,7 +89,7 @@ def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[
                 slopes(contact, end, about[stage], by_speed[stage], by_place[stage])
         if fresh:
             _couple(by_speed, by_place, h, unknowns, factors)
-            factorise(factors)
+            vector.factorise(factors)
         last, correction = correction, _correct(change, rates, h, unknowns, factors, rest, scale)
         correction = max(correction, _follow(contact, start, h, change, rates, scale))
         off = 0.0
@@ -146,7 +138,7 @@ def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, res
     for i in range(STAGES):
         for part in range(unknowns):
             rest[i * unknowns + part] = _gained(rates, h, i, 3 + part) - change[i, 3 + part]
-    solve(factors, rest)
+    vector.solve(factors, rest)
     most = 0.0
     for i in range(STAGES):
         for part in range(unknowns):
@@ -273,7 +265,8 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
     A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r).
     """
     physics = contact.physics
-    by_speed[:], by_place[:] = 0.0, 0.0
+    by_speed.fill(0.0)
+    by_place.fill(0.0)
     spin, none = spin_of(physics, motion), Vector(0.0, 0.0, 0.0)
     for k in range(NODES):
         if contact.regime.bits[k] & PUSHED == 0:
