@@ -18,7 +18,7 @@ from stiffdice.simulation.run import simulate
 from stiffdice.study import config as study
 from stiffdice.study import job_log, outputs, provenance
 from stiffdice.study.catalogue import TABLES
-from stiffdice.study.output_digest import digest_of
+from stiffdice.study.job_log import digest_of
 from stiffdice.sweep import partition, stability_limits
 from stiffdice.sweep.collect import collect
 from stiffdice.sweep.shard import compute_shard

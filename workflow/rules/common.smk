@@ -10,7 +10,6 @@ from stiffdice.cli.progress import notes
 from stiffdice.errors import InputError, printable
 from stiffdice.study import config as studies
 from stiffdice.study import job_log
-from stiffdice.study import output_digest as made
 from stiffdice.study import outputs as results
 from stiffdice.study import provenance as asked
 from stiffdice.study.catalogue import DRAWINGS, TABLES
@@ -225,7 +224,7 @@ def set_aside_changed():
             told = job_log.read(top / result.log)
             if told is None or f"{top}/{result.benchmark}" not in jobs_due():
                 continue
-            for file in made.changed(told, top, *(file for file in result.files if file in told.made)):
+            for file in job_log.changed(told, top, *(file for file in result.files if file in told.made)):
                 (top / file).rename(top / f"{file}.damaged")
                 print(
                     f"stiffdice: {top}/{file}: not what its job made: another file in its place, or changed by hand; "

@@ -17,7 +17,7 @@ from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.scene import scene as scenes
 from stiffdice.simulation import backend
 from stiffdice.simulation.engines import stepper
-from stiffdice.study import catalogue, job_log, output_digest, outputs
+from stiffdice.study import catalogue, job_log, outputs
 from stiffdice.study.config import Study
 from stiffdice.study.outputs import Result
 
@@ -87,9 +87,8 @@ def stale(asked: Mapping[Result, Asked], folder: Path) -> dict[Result, str]:
             told = job_log.read(folder / result.log)
             reason = other(now, told)
             if told is not None and not reason:
-                reason = output_digest.reason(told, output_digest.changed(told, folder, *result.files))
-            if reason:
-                found[result] = reason
+                reason = job_log.reason_of_change(told, job_log.changed(told, folder, *result.files))
+            found |= {result: reason} if reason else {}
     return found
 
 

@@ -77,7 +77,9 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     }
     for name in (criteria.CRITERIA[criterion].MEASURE for criterion in tolerances):
         long_name = f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}"
-        values[f"largest_{name}"] = "cell", _largest(measures[name]), {"long_name": long_name, "units": "1"}
+        numbers = np.where(np.isnan(measures[name]), -np.inf, measures[name]).max(axis=1)
+        largest = np.where(np.isneginf(numbers), np.nan, numbers)  # not-a-number only where all members are
+        values[f"largest_{name}"] = "cell", largest, {"long_name": long_name, "units": "1"}
     values |= {name: runs[name].values for name in dataset.CELL_ATTRIBUTES}
     values |= {
         "criterion": np.arange(len(tolerances), dtype=np.int8),
@@ -85,9 +87,3 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     }
     attributes = dict(runs.attrs) | {"members": runs.sizes["member"]}
     return schema.dataset("sweep", values, MEANINGS | {"criterion": list(tolerances)}, attributes)
-
-
-def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the largest of the members, shape (cell,); not-a-number only where all are."""
-    numbers = np.where(np.isnan(measure), -np.inf, measure).max(axis=1)
-    return np.asarray(np.where(np.isneginf(numbers), np.nan, numbers))

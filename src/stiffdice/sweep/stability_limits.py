@@ -134,16 +134,13 @@ def _dataset(
     sweep: xr.Dataset, laws: npt.NDArray[np.int8], stiffnesses: Values, found: Mapping[str, Values]
 ) -> xr.Dataset:
     scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
-    limits = [
-        linear_theory.steps_for(scene.with_ground(stiffness=value), linear_theory.STABILITY_LIMIT)
-        for value in stiffnesses
-    ]
+    grounds = (scene.with_ground(stiffness=value) for value in stiffnesses)
     members = int(sweep.attrs["members"])
     passing = members - sweep.failing.values.astype(np.int64)
     low, high = confidence(passing, members)
     values: dict[str, Any] = {
         **{name: found[name] for name in (*EDGES, "flips")},
-        "limit": limits,
+        "limit": [linear_theory.steps_for(ground, linear_theory.STABILITY_LIMIT) for ground in grounds],
         "pass_fraction": passing / members,
         "pass_fraction_low": low,
         "pass_fraction_high": high,
