@@ -75,6 +75,6 @@ class Duration:
         if told is None or told.begun is None or told.begun.timestamp() < self._begun - 1:  # told in whole seconds
             told = None
         if told is None or not told.ending:
-            return forecast.job(result, weight, told, due=True, took=None)
+            return Job(result, weight, None, True, told)
         took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
-        return forecast.job(result, weight, None, due=False, took=took)
+        return Job(result, weight, took, False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,15 +15,25 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.state import TURNING, start_of
 from stiffdice.errors import InputError, NotInstalledError, printable
+from stiffdice.integrators import registry as schemes
 from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
+from stiffdice.scene.ground import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.initial_conditions import phased, turned
-from stiffdice.study import catalogue, schema_check
+from stiffdice.study import catalogue
 from stiffdice.sweep.grid import Sweep
+
+# What the schema of a study's file leaves to the code.
+_NAMES = {
+    "model": model_selection.CHOICES,
+    "scheme": schemes.SCHEMES,
+    "simulator": (backend.OURS, *engines.ENGINES),
+    "contact_law": CONTACT_LAWS,
+}
 
 # In units of the side: nodes that are this level land at once, as far as their restitution shows.
 _FLAT = 1e-9
@@ -109,7 +120,7 @@ def load(path: str | Path, schema: str | Path) -> Study:
         told = f"those in {above}/ are {', '.join(there)}" if there else f"{above}/ has none"
         raise InputError(f"{path}: there is no study {name}; {told}{validation.meant(name, there)}")
     data = yaml_loader.load(path)
-    schema_check.check(data, schema, str(path))
+    _check(data, yaml_loader.load(schema), str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
         left_out: list[str] = []
@@ -130,6 +141,47 @@ def load(path: str | Path, schema: str | Path) -> Study:
         )
     except InputError as error:
         raise error.within(str(path)) from None
+
+
+def _check(data: object, schema: Any, source: str) -> None:
+    """Raise InputError unless a study's data are as a JSON schema says, which leaves names to the code."""
+    import jsonschema  # which takes a while to import
+
+    numbers = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number)
+    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)  # type: ignore[no-untyped-call]
+    for name, words in _NAMES.items():
+        schema["$defs"][name] = {"enum": list(words), "errorMessage": f"allowed is {' or '.join(words)}"}
+    error = jsonschema.exceptions.best_match(kind(schema).iter_errors(data))
+    if error is not None:
+        raise InputError(f"{source}: {_reason(error)}")
+
+
+def _is_number(_checker: object, value: object) -> bool:
+    """Return whether a value is a number; NaN is none: no bound of a schema stops it."""
+    return not isinstance(value, bool) and (
+        isinstance(value, int) or (isinstance(value, float) and not math.isnan(value))
+    )
+
+
+def _reason(error: Any) -> str:
+    """Return a schema error as one line that names the key, its value and what is allowed."""
+    where = ".".join(str(part) for part in error.absolute_path)
+    try:
+        if error.validator == "additionalProperties":
+            validation.known_keys(where, error.instance, list(error.schema["properties"]))
+    except InputError as unknown:
+        return str(unknown)
+    if error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        return f"{where + '.' if where else ''}{missing[0]} is missing"
+    allowed = error.schema.get("errorMessage")
+    if error.validator == "enum" and allowed:
+        allowed += validation.meant(error.instance, error.validator_value)
+    if error.validator == "oneOf":
+        return f"{where}: {allowed}"
+    if "propertyNames" in error.absolute_schema_path:
+        return f"{where}.{error.instance}: allowed names have small letters, digits and hyphens"
+    return f"{where or 'the file'} = {validation.shown(error.instance)}: {allowed or error.message}"
 
 
 def _installed(

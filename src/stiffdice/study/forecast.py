@@ -59,45 +59,40 @@ _LOOK = 0.01
 
 
 class Job(NamedTuple):
-    """What is known of how long one job takes; all times in seconds.
+    """What is known of how long the job of a result takes [s].
 
-    kind: jobs of one kind take as long as their weight says. took: the job, when it last ended well, or in all by its
-    progress; None if neither is known. due: whether it is still to be made. elapsed: since it began, 0 if it is not
-    running. alone: whether nothing runs beside it.
+    weight: jobs of one kind take as long as it says. took: the job, when it last ended well, if it is known. due:
+    whether it is still to be made. log: of a running one.
     """
 
-    kind: str
+    result: Result
     weight: float
     took: float | None
     due: bool
-    elapsed: float = 0.0
-    alone: bool = False
-
-
-def job(result: Result, weight: float, log: Told | None, *, due: bool, took: float | None) -> Job:
-    """Return what is known of a result's job; log: of a running one."""
-    kind = f"shard {result.name.partition('/')[0]}" if result.stage == "shard" else result.stage
-    elapsed = 0.0
-    if log and log.begun:
-        elapsed = (datetime.now(UTC) - log.begun).total_seconds()
-        took = (log.written - log.begun).total_seconds() / log.progress if log.progress else took
-    return Job(kind, weight, took, due, elapsed, alone=result.stage == "timings")
+    log: Told | None = None
 
 
 def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
-    """Return about how long [s] the jobs that are due take; `cores` of them at a time, those `alone` one by one.
+    """Return about how long [s] the jobs that are due take; `cores` of them at a time, timings one by one.
 
-    A job takes as long as it took before; one that never ended, as the median of its kind. Of a kind of which none
-    ended, as all that have; where none has, `pace` [s] for each of its weight.
+    A job takes as long as its progress says, else as it took before; one that never ended, as the median of its kind.
+    Of a kind of which none ended, as all that have; where none has, `pace` [s] for each of its weight.
     """
-    ended = [(job.kind, job.took / job.weight) for job in jobs if job.took is not None]
+    known = []
+    for (stage, name, _), weight, took, due, log in jobs:
+        kind, elapsed, whole = f"shard {name.partition('/')[0]}" if stage == "shard" else stage, 0.0, took
+        if log and log.begun:
+            elapsed = (datetime.now(UTC) - log.begun).total_seconds()
+            whole = (log.written - log.begun).total_seconds() / log.progress if log.progress else took
+        known.append((kind, weight, whole, due, elapsed))
+    ended = [(kind, whole / weight) for kind, weight, whole, _, _ in known if whole is not None]
     pace = median(rate for _, rate in ended) if ended else pace
     rates = {kind: median(rate for other, rate in ended if other == kind) for kind in dict(ended)}
     shared, alone = [0.0], [0.0]
-    for job in jobs:
-        if job.due:
-            whole = rates.get(job.kind, pace) * job.weight if job.took is None else job.took
-            (alone if job.alone else shared).append(max(0.0, whole - job.elapsed))
+    for kind, weight, whole, due, elapsed in known:
+        if due:
+            expected = rates.get(kind, pace) * weight if whole is None else whole
+            (alone if kind == "timings" else shared).append(max(0.0, expected - elapsed))
     return max(sum(shared) / cores, *shared) + sum(alone)
 
 

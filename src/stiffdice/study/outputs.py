@@ -46,13 +46,12 @@ def dangling(result: Result, folder: Path) -> str:
 
 def of(study: Study) -> list[Result]:
     """Return the results of a study, in the order in which one stands on another."""
-    return [result for result, _ in _made(study)]
+    return list(needs(study))
 
 
 def needs(study: Study) -> dict[Result, tuple[Result, ...]]:
     """Return for each result of a study those that it is made from, in the same order."""
-    found: dict[tuple[str, str], Result] = {}
-    below: dict[Result, tuple[Result, ...]] = {}
+    found, below = dict[Key, Result](), dict[Result, tuple[Result, ...]]()
     for result, keys in _made(study):
         found[result.stage, result.name] = result
         below[result] = tuple(found[key] for key in keys)
@@ -71,14 +70,12 @@ def _made(study: Study) -> Iterator[tuple[Result, Sequence[Key]]]:
     for name, sweep in study.sweeps.items():
         yield from _swept(f"sweeps/{name}", name, sweep)
     for name, figure in study.figures.items():
-        below = _shown_by(study, figure, DRAWINGS[figure.draw].given)
-        if figure.draw == "animation":
-            yield Result("animation", name, (f"figures/{name}.gif",)), below
-        else:
-            yield Result("figure", name, (f"figures/{name}.svg", f"figures/{name}.png")), below
+        stage, kinds = ("animation", ["gif"]) if figure.draw == "animation" else ("figure", ["svg", "png"])
+        files = tuple(f"figures/{name}.{kind}" for kind in kinds)
+        yield Result(stage, name, files), _shown_by(study, figure, DRAWINGS[figure.draw].given)
     for name, table in study.tables.items():
-        below = _shown_by(study, table, TABLES[table.draw].given)
-        yield Result("table", name, (f"tables/{name}.md", f"tables/{name}.csv")), below
+        files = f"tables/{name}.md", f"tables/{name}.csv"
+        yield Result("table", name, files), _shown_by(study, table, TABLES[table.draw].given)
 
 
 def _swept(top: str, name: str, sweep: Sweep) -> Iterator[tuple[Result, Sequence[Key]]]:

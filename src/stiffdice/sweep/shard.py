@@ -113,25 +113,19 @@ def shard_pattern(sweep: Sweep) -> xr.Dataset:
     }
     values |= _cell_values(sweep, sweep.columns()[0], [1])
     values |= {name: np.arange(sizes[name], dtype=values[name].dtype) for name in ("member", "criterion")}
-    attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
-    return schema.dataset("shard", values, MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
-
-
-def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
-    code = "stiffdice.sweep.shard", *backend.code_of(sweep.simulator)
+    title, code = "Runs of a sweep of stiffness and steps", ("stiffdice.sweep.shard", *backend.code_of(sweep.simulator))
     attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
     attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
     attributes |= dataset.config_attributes("shard", sweep.of_runs)
-    attributes["seed"] = sweep.seed
-    attributes["model_reason"] = sweep.model_reason
-    attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
+    note = "contact law and stiffness are the cell's, not the scene's"
+    attributes |= {"seed": sweep.seed, "model_reason": sweep.model_reason, "scene_note": note}
     attributes["early_stop"] = int(sweep.early_stop)
     if sweep.early_stop:  # otherwise the measures hold for any tolerances
         attributes["criteria"] = dataset.criteria_text(sweep.criteria)
     for name, unit in (("horizon", "s"), ("hop_height", "m")):
         if name in sweep.of_runs:
             attributes |= {name: sweep.of_runs[name], f"{name}_units": unit}
-    return attributes
+    return schema.dataset("shard", values, MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
 
 
 def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
