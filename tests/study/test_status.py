@@ -19,7 +19,7 @@ from stiffdice.cli import status as command
 from stiffdice.errors import InputError
 from stiffdice.io import seal
 from stiffdice.study import config as studies
-from stiffdice.study import forecast, job_log, outputs, provenance, status
+from stiffdice.study import forecast, job_log, outputs, status
 from stiffdice.study.job_log import digest_of
 from stiffdice.study.status import State
 from stiffdice.sweep import partition
@@ -39,7 +39,7 @@ class Made:
     """A folder of results, made up."""
 
     def __init__(self, study, folder):
-        self.study, self.folder, self.asked = study, folder, provenance.of(study, ROOT)
+        self.study, self.folder, self.asked = study, folder, outputs.asked(study, ROOT)
         for result in outputs.of(study):
             self.make(result)
 

@@ -11,7 +11,6 @@ from stiffdice.errors import InputError, printable
 from stiffdice.study import config as studies
 from stiffdice.study import job_log
 from stiffdice.study import outputs as results
-from stiffdice.study import provenance as asked
 from stiffdice.study.catalogue import DRAWINGS, TABLES
 from stiffdice.sweep import partition as shards
 
@@ -62,7 +61,7 @@ def needs_of(name):
 @cache
 def asked_by(name):
     needs_of(name)
-    return asked.of(study(name))
+    return results.asked(study(name))
 
 
 @cache
@@ -82,7 +81,7 @@ def asked_of(stage, name):
 @cache
 def stale_files(name):
     top = Path("results", name)
-    return [f"{top}/{file}" for result in asked.stale(asked_by(name), top) for file in result.files]
+    return [f"{top}/{file}" for result in results.stale(asked_by(name), top) for file in result.files]
 
 
 def not_stale(wildcards):
@@ -220,7 +219,7 @@ def set_aside_changed():
     """Keep, as NAME.damaged, what took the place of what a job made, before Snakemake removes it to make that again."""
     for name in {*jobs_due().values()}:
         top = Path("results", name)
-        for result in asked.stale(asked_by(name), top):
+        for result in results.stale(asked_by(name), top):
             told = job_log.read(top / result.log)
             if told is None or f"{top}/{result.benchmark}" not in jobs_due():
                 continue

@@ -21,7 +21,7 @@ from stiffdice.io import host, seal, text_file
 # Bytes that are read, of a log and of a benchmark file (two lines of numbers); digits that are kept of a digest.
 _MOST, _LARGEST_BENCHMARK, _DIGITS = 1 << 20, 10_000, 16
 
-# Lines: what the job was asked (`provenance.Asked`); a file that it made, and its digest; the fraction of the work
+# Lines: what the job was asked (`outputs.Asked`); a file that it made, and its digest; the fraction of the work
 # done; cells and runs in a finished shard; the most memory [MB] held at a time; the seconds of a job that made what it
 # should; the signal that told it to stop. `begun` and `failed` are below.
 asked = "asked: {}".format
@@ -44,7 +44,7 @@ class Told(NamedTuple):
     """What a log says so far.
 
     begun: when (UTC), None if it does not say. process, host: of the job. asked: digests of what it was asked
-    (`provenance.Asked`), empty if it does not say. progress: fraction of the work done. made: digests of the files that
+    (`outputs.Asked`), empty if it does not say. progress: fraction of the work done. made: digests of the files that
     the job made (`digest_of`), by their paths under results/STUDY. cells: in the finished shard, if it says. ending:
     `done`, `failed` or `interrupted`; empty without a last word. reason: of an ending that is not `done`, one line.
     written: when the log was last written to (UTC).

@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
 from stiffdice.errors import printable
-from stiffdice.study import forecast, job_log, outputs, provenance
+from stiffdice.study import forecast, job_log, outputs
 from stiffdice.study.config import Study
 from stiffdice.study.outputs import Result
 from stiffdice.sweep import partition
@@ -134,7 +134,7 @@ def of(study: Study, folder: Path, cores: int | None = None) -> Status:
     folder: results/STUDY, there or not. cores: for the time left; by default as many as jobs are running.
     """
     found, lost, ready = dict[Result, Standing](), dict[Result, Standing](), []
-    stale = provenance.stale(provenance.of(study), folder)
+    stale = outputs.stale(outputs.asked(study), folder)
     for result, parts in outputs.needs(study).items():
         standing, stands = _alone(result, folder), all(found[part].state is State.DONE for part in parts)
         if standing.state is State.DONE and result in stale:

@@ -76,7 +76,8 @@ def of(sweep: Sweep, pieces: Sequence[Piece]) -> Array:
     steps = np.array([steps for piece in pieces for steps in piece.steps], np.float64)
     column = np.repeat(np.arange(len(pieces)), counts)
     compared = min(sweep.horizon, sweep.scene.duration) if "trajectory" in sweep.criteria else 0.0
-    aside = _is_default(sweep) and sweep.members >= FEWEST and compared == 0.0
+    default = (sweep.simulator, sweep.scheme) == (OURS, DEFAULT_SCHEME)
+    aside = default and sweep.members >= FEWEST and compared == 0.0
     blocks = -(-sweep.members // MEMBERS)
     # At the extremes a time or a speed leaves the range of doubles: then a run is one of all its steps.
     with np.errstate(all="ignore"):
@@ -87,10 +88,6 @@ def of(sweep: Sweep, pieces: Sequence[Piece]) -> Array:
             contacts = np.fmin(course[-1, 0], LOOKS)
             work = work + ((REFERENCE + CONTACT * contacts) * launches / counts / sweep.members)[column]
     return np.asarray(CELL + blocks * BLOCK + sweep.members * work)
-
-
-def _is_default(sweep: Sweep) -> bool:
-    return sweep.simulator == OURS and sweep.scheme == DEFAULT_SCHEME
 
 
 def _bounces(sweep: Sweep, pieces: Sequence[Piece], until: Array, aside: bool) -> tuple[Array, Array]:
@@ -161,9 +158,9 @@ def _run(sweep: Sweep, compared: float, aside: bool, steps: Array, ball: Array, 
     (drag, omega, kept, first), (stepped, skipped, (_, resting), landings) = ball, course
     duration, ours, turning = sweep.scene.duration, sweep.simulator == OURS, sweep.model in TURNING
     *prices, start = PRICES.get(sweep.scheme if ours else sweep.simulator, OTHER)
-    seen, h = prices[turning], duration / steps
+    seen, h, default = prices[turning], duration / steps, ours and sweep.scheme == DEFAULT_SCHEME
     omega_h, rests, known = omega * h, duration - resting, np.full(h.shape, math.inf)
-    if _is_default(sweep) and not turning:  # from when on [s] a cube is known to rest
+    if default and not turning:  # from when on [s] a cube is known to rest
         decay = np.float64(sweep.scene.ground.damping / sweep.scene.cube.mass)
         grows = SWING_GROWS * duration * np.where(drag > 0.0, 8.0, 4.0) * decay * omega_h * omega_h
         is_known = (rests < duration) & (omega_h <= LONGEST_HELD) & (grows <= SWING_SHRINKS)
@@ -185,7 +182,7 @@ def _run(sweep: Sweep, compared: float, aside: bool, steps: Array, ball: Array, 
     early = np.fmin(compared / h, early * _share(ends, 0.0, compared))
     late = np.fmax(0.0, whole - before) * _share(ends, compared, rests)
     late = late + np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h
-    unseen = UNSEEN[turning] if _is_default(sweep) else seen
+    unseen = UNSEEN[turning] if default else seen
     unseen = np.where((drag > 0.0) & aside, ASIDE[turning], unseen)
     return np.asarray(start + seen * early + unseen * np.fmin(steps, late))
 
