@@ -258,23 +258,22 @@ def _planned_figure(
     takes = {"run": "runs"} if entry.given == "runs" else {"of": entry.given}
     if entry.timed:
         takes["timings"] = "timings"
-    for key in ("run", "of", "timings"):
-        if key in part and key not in takes:
-            told = "; ".join(f"name {kind} with `{other}`" for other, kind in takes.items())
+    asked = {key: [part[key]] if key == "run" else part[key] for key in ("run", "of", "timings") if key in part}
+    for key, names in asked.items():
+        if key not in takes:
+            told = "; ".join(f"name {given} with `{other}`" for other, given in takes.items())
             raise InputError(f"{where}.{key} = {validation.shown(part[key])}: {draw} shows none of these; {told}")
-    of = (part["run"],) if "run" in part else tuple(part.get("of", ()))
-    planned = PlannedFigure(draw, of, part["title"], tuple(part.get("timings", ())))
-    if not planned.of:
-        raise InputError(f"{where}.{'run' if 'run' in takes else 'of'} is missing: {draw} needs names of {entry.given}")
-    for (key, kind), names in zip(takes.items(), (planned.of, planned.timings), strict=False):
+        kind, allowed = takes[key], data.get(takes[key], {})
         for name in names:
-            allowed = data.get(kind, {})
             if name not in allowed:
                 told = " or ".join(allowed) or f"none: this study has no {kind}"
                 raise InputError(f"{where}.{key} = {name}: allowed is {told}{validation.meant(name, allowed)}")
             if entry.measures and allowed[name]["measure"] != entry.measures:
                 raise InputError(f"{where}.{key} = {name}: {draw} shows only {kind} that measure {entry.measures}")
-    return planned
+    first, *_ = takes
+    if first not in asked:
+        raise InputError(f"{where}.{first} is missing: {draw} needs names of {entry.given}")
+    return PlannedFigure(draw, tuple(asked[first]), part["title"], tuple(asked.get("timings", ())))
 
 
 def _experiment(

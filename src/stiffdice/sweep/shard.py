@@ -143,7 +143,14 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
     }
     first = 0
     for part in parts:
-        check_like(part, like)
+        if other := differing(like.attrs, part.attrs):
+            raise RefusedError(f"not the shard planned: other {', '.join(other)}")
+        for name in like.variables.keys() | part.variables.keys():
+            kinds = {(data[name].dims, data[name].dtype) if name in data.variables else None for data in (like, part)}
+            if len(kinds) > 1:
+                raise RefusedError(f"not the shard planned: other variable {name}")
+        if part.sizes["member"] != sweep.members:
+            raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {sweep.members}")
         cells = slice(first, first + part.sizes["cell"])
         for name in CELL:
             if not np.array_equal(part[name].values, planned[name][cells]):
@@ -157,15 +164,3 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
 def differing(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
     """Return the names of attributes that two files of runs do not share."""
     return [key for key in {**ours, **theirs} if str(ours.get(key)) != str(theirs.get(key))]
-
-
-def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
-    """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
-    if other := differing(pattern.attrs, part.attrs):
-        raise RefusedError(f"not the shard planned: other {', '.join(other)}")
-    for name in pattern.variables.keys() | part.variables.keys():
-        kinds = {(data[name].dims, data[name].dtype) for data in (pattern, part) if name in data.variables}
-        if len(kinds) > 1 or not (name in pattern.variables and name in part.variables):
-            raise RefusedError(f"not the shard planned: other variable {name}")
-    if part.sizes["member"] != pattern.sizes["member"]:
-        raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")
