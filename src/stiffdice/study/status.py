@@ -247,18 +247,17 @@ def as_line(status: Status) -> str:
 
 def as_text(status: Status) -> str:
     """Return a page: what is done, what runs, what failed and why, what is left to do, what it takes on disk."""
-    rows = [("results", _counts(status.standings))]
-    rows += [("time left", _left(status))] if status.state is not State.DONE else []
+    lines, use = [f"{status.study.name}: {status.study.question}", ""], status.use
+    lines.append(f"{'results':12}{_counts(status.standings)}")
+    lines += [f"{'time left':12}{_left(status)}"] if status.state is not State.DONE else []
     for name, cells in status.cells.items():
         whole = f"{cells.done:,} of {'at least ' if cells.at_least else ''}{cells.planned:,} done ({cells.runs:,} runs)"
         others = ((cells.running, "running"), (cells.failed, "failed or interrupted"))
-        rows.append(
-            ("cells", ", ".join([f"{name}: {whole}", *(f"{count:,} {word}" for count, word in others if count)]))
-        )
-    rows.append(("", ""))
+        parts = [f"{count:,} {word}" for count, word in others if count]
+        lines.append(f"{'cells':12}{', '.join([f'{name}: {whole}', *parts])}")
+    lines.append("")
     for stage in dict.fromkeys(standing.result.stage for standing in status.standings):
-        rows.append((stage, _counts([part for part in status.standings if part.result.stage == stage])))
-    lines = [f"{status.study.name}: {status.study.question}", "", *_rows(rows)]
+        lines.append(f"{stage:12}{_counts([part for part in status.standings if part.result.stage == stage])}")
     for state in (State.RUNNING, State.INTERRUPTED, State.FAILED):
         if found := status.those(state):
             lines += ["", str(state), *(line for standing in found for line in _lines(status, standing))]
@@ -268,13 +267,13 @@ def as_text(status: Status) -> str:
             lines.append(f"  {_names([standing for standing in stale if standing.reason == reason])}  {reason}")
     if status.stuck:
         lines += ["", f"not made because of that: {_names(status.stuck)}"]
-    use = status.use
-    rows = [("disk", ": ".join(filter(None, [_bytes(use.total), ", ".join(_sizes(use.kinds))])))]
+    lines += ["", f"{'disk':12}{': '.join(filter(None, [_bytes(use.total), ', '.join(_sizes(use.kinds))]))}"]
     if use.stale:
-        rows.append(("stale", f"shards of other grids: {len(use.stale)}, {_bytes(sum(use.stale.values()))}"))
-    rows += [("leftover", f"{told}, of a process that does not run on this host") for told in _sizes(use.leftover)]
-    rows += [("damaged", f"{told}, set aside") for told in _sizes(use.damaged)]
-    lines += ["", *_rows(rows), *(line for told in status.study.left_out for line in ("", told))]
+        lines.append(f"{'stale':12}shards of other grids: {len(use.stale)}, {_bytes(sum(use.stale.values()))}")
+    gone = "of a process that does not run on this host"
+    lines += [f"{'leftover':12}{told}, {gone}" for told in _sizes(use.leftover)]
+    lines += [f"{'damaged':12}{told}, set aside" for told in _sizes(use.damaged)]
+    lines += [line for told in status.study.left_out for line in ("", told)]
     return "\n".join(map(printable, lines))
 
 
@@ -307,10 +306,6 @@ def failures(status: Status) -> str:
     if status.ready:
         lines.append(f"  not made, and no log says why: {_names(status.ready)}")
     return "\n".join(map(printable, lines))
-
-
-def _rows(rows: Sequence[tuple[str, str]]) -> list[str]:
-    return [f"{label:12}{text}" if label else "" for label, text in rows]
 
 
 def _counts(standings: Sequence[Standing]) -> str:
