@@ -19,7 +19,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines import registry as engines
