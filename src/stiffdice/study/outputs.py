@@ -179,7 +179,8 @@ def stale(asks: Mapping[Result, Asked], folder: Path) -> dict[Result, str]:
             reason = other(now, told)
             if told is not None and not reason:
                 reason = job_log.reason_of_change(told, job_log.changed(told, folder, *result.files))
-            found |= {result: reason} if reason else {}
+            if reason:
+                found[result] = reason
     return found
 
 

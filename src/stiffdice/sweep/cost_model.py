@@ -112,7 +112,7 @@ def _bounces(sweep: Sweep, pieces: Sequence[Piece], until: Array, aside: bool) -
     climb = np.float64(upwards) / pull
     fall, speed = _fall(pull, drag, clearance + 0.5 * climb * upwards)
     lands = (stiffness > 0.0) & (sweep.model in TOUCHING) & (pull > 0.0)
-    first, climb = np.where(lands, np.fmax(0.0, climb + fall), math.inf), max(0.0, climb)
+    first, climb = np.where(lands, np.fmax(0.0, climb + fall), math.inf), np.float64(max(0.0, climb))
     if turning:
         kept, touch, speed = kept / (1 + RUBBED * min(1.0, ground.friction)), CORNERS * touch, UPWARDS * speed
     time, rising = np.fmin(first, until), np.fmin(climb, until)
@@ -182,8 +182,7 @@ def _run(sweep: Sweep, compared: float, aside: bool, steps: Array, ball: Array, 
     early = np.fmin(compared / h, early * _share(ends, 0.0, compared))
     late = np.fmax(0.0, whole - before) * _share(ends, compared, rests)
     late = late + np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h
-    unseen = UNSEEN[turning] if default else seen
-    unseen = np.where((drag > 0.0) & aside, ASIDE[turning], unseen)
+    unseen = np.where((drag > 0.0) & aside, ASIDE[turning], UNSEEN[turning] if default else seen)
     return np.asarray(start + seen * early + unseen * np.fmin(steps, late))
 
 
