@@ -21,7 +21,7 @@ from stiffdice.archive.contents import LOGS, REPORT, File
 from stiffdice.archive.sizes import Sizes
 from stiffdice.errors import RefusedError
 from stiffdice.study.config import Study
-from stiffdice.study.eta import took
+from stiffdice.study.job_log import took
 from stiffdice.study.outputs import Result
 
 NAME = "ro-crate-metadata.json"
