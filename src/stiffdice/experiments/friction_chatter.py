@@ -21,7 +21,7 @@ from stiffdice.experiments.placement import STARTS, contact_frequency, level, re
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -82,5 +82,5 @@ def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
     steps += round(2.5 * friction * flat.gravity * h / physics_of(flat).cutoff)
     still = STARTS["at_rest"](flat.with_ground(friction=friction))
     sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
-    start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * steps), MODEL, steps, steps)
+    start = engines.ready(SCHEME, dataclasses.replace(sliding, duration=h * steps), MODEL, steps, steps)
     return float(np.abs(start()().states["velocity"][-_LAST:, 0]).max())

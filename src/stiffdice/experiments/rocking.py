@@ -29,7 +29,7 @@ from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
 from stiffdice.scene.scene import Launch, Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
 _TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
@@ -253,7 +253,7 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     launch = Launch(position=(0.0, 0.0, half - sag + lift), velocity=(0.0, 0.0, 0.0), orientation=(tip, 0.0, 0.0))
     damped = scene.with_ground(damping=2 * zeta * omega * scene.ground.stiffness / mode.predicted)
     nudged = dataclasses.replace(damped, launch=launch, duration=h * steps)
-    state, upright = stepper.ready(SCHEME, nudged, MODEL, steps, steps)()().states, scene.cube.node_offsets()
+    state, upright = engines.ready(SCHEME, nudged, MODEL, steps, steps)()().states, scene.cube.node_offsets()
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
     small = np.abs(heights + sag).max(axis=1) <= _FOLLOWED * sag

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.scene import scene as scenes
 from stiffdice.simulation import backend
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.study import catalogue, job_log, output_digest, outputs
 from stiffdice.study.config import Study
 from stiffdice.study.outputs import Result
@@ -117,7 +117,7 @@ def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
             timed = result.stage == "timings"
             plans, entries = (study.timings, catalogue.TIMINGS) if timed else (study.experiments, catalogue.EXPERIMENTS)
             asked = plans[name]
-            plan = [asked.measure, asked.options, stepper.attributes(asked.options.get("methods", ()))]
+            plan = [asked.measure, asked.options, engines.attributes(asked.options.get("methods", ()))]
             return scenes.load(root / asked.scene, asked.changes).digest, plan, entries[asked.measure].module
         case "figure" | "animation":
             return "-", [study.figures[name], [study.dpi]], catalogue.DRAWINGS[study.figures[name].draw].module

@@ -22,7 +22,7 @@ from stiffdice.experiments.placement import contact_frequency, landing_speed
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 # By name: what is stored of each method, over what is exact.
 RATIOS = {
@@ -55,7 +55,7 @@ def measure(
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short, or stops sliding in the bounce.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     grounds = numbers("stiffness", stiffness, "kg/s²", above=0)
     dampings = numbers("damping", damping, "kg/s", at_least=0)
     steps = numbers("omega_h", omega_h, "1", above=0)
@@ -67,7 +67,7 @@ def measure(
     found = mapped(ratios, RATIOS, method=names, stiffness=grounds, damping=dampings, omega_h=steps)
     attributes = dataset.provenance_attributes("Contacts over the exact ones", scene, MODEL, "method", __name__)
     note = "ground: level, gated, stiffness and damping as the dimensions say; an upright cube"
-    return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"scene_note": note})
+    return xr.Dataset(found, attrs=attributes | engines.attributes(names) | {"scene_note": note})
 
 
 @cache

@@ -20,7 +20,7 @@ from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 # The paper's scheme, the one that is like what engines do to contacts, and the engines that are always there.
 METHODS = ("symplectic_euler", "implicit_euler", "scipy", "numpy")
@@ -56,7 +56,7 @@ def measure(
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     special = [linear_theory.magic_step(n) for n in np.arange(1.5, _MAGIC + 1, 0.5)]
     values = scan(*span(omega_h), validation.count("count", count, at_least=2), special).tolist()
     phase = np.arange(validation.count("phases", phases)) / phases
@@ -75,7 +75,7 @@ def measure(
     found["exact_restitution"] = quantity((), flat_bounce.restitution(smooth, speed), "exact restitution")
     attributes = dataset.provenance_attributes("The longest steps", scene, MODEL, "method", __name__)
     note = "ground: level, gated, without friction; an upright cube"
-    return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"scene_note": note})
+    return xr.Dataset(found, attrs=attributes | engines.attributes(names) | {"scene_note": note})
 
 
 def _growth(method: str, scene: Scene, h: float) -> float:

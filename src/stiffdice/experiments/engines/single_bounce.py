@@ -13,7 +13,7 @@ from stiffdice.dynamics.state import STATE, Array, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.placement import contact_frequency, level, upright
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL = "sliding"
 
@@ -48,7 +48,7 @@ def heights_at_rest(method: str, scene: Scene, h: float, steps: int, nudge: floa
     launch = Launch((0.0, 0.0, height), (0.0, 0.0, 0.0), node_velocity="rigid")
     resting = dataclasses.replace(scene, launch=launch, duration=steps * h)
     states = np.zeros(steps, STATE)
-    stepper.start(method, resting, MODEL, start_of(resting, MODEL), h).advance(states, 1)
+    engines.adapter_of(method)(resting, MODEL, start_of(resting, MODEL), h).advance(states, 1)
     return np.asarray(states["position"][:, 2])
 
 
@@ -60,7 +60,7 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
     contact = math.pi / contact_frequency(scene)
     chunk = 3 + math.ceil(1.2 * contact / h)
     scene, launch = _launched(scene, method, speed, h, phase, chunk * _PATIENCE)
-    engine = stepper.start(method, scene, MODEL, launch, h)
+    engine = engines.adapter_of(method)(scene, MODEL, launch, h)
     states, outcome = launch, "stays"
     for _ in range(_PATIENCE):
         more = np.zeros(chunk, STATE)
@@ -73,7 +73,7 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
         return Bounce(outcome, math.nan, math.nan, math.nan)
     low = states["position"][:, 2] - scene.cube.side / 2
     # The slope of the path, which the velocity is behind: in the air by gravity's pull.
-    up = states["velocity"][-1, 2] - stepper.lag(method) * h * scene.gravity
+    up = states["velocity"][-1, 2] - engines.adapter_of(method).LAG * h * scene.gravity
     leaving = math.sqrt(up**2 + 2 * scene.gravity * low[-1])
     contact_time = _below(low) * h
     slowed = states["velocity"][0, 0] - states["velocity"][-1, 0]
@@ -85,7 +85,7 @@ def _launched(scene: Scene, method: str, speed: float, h: float, phase: float, s
     height = speed * h * (1 + phase)
     if 2 * scene.gravity * height >= speed**2:
         raise InputError(f"omega_h: a step of {h:.3g} s is too long for a fall that ends at {speed:.3g} m/s")
-    down = math.sqrt(speed**2 - 2 * scene.gravity * height) - stepper.lag(method) * h * scene.gravity
+    down = math.sqrt(speed**2 - 2 * scene.gravity * height) - engines.adapter_of(method).LAG * h * scene.gravity
     x, y, _ = scene.launch.velocity
     placed = Launch((0.0, 0.0, scene.cube.side / 2 + height), (x, y, -down), node_velocity="rigid")
     scene = dataclasses.replace(scene, launch=placed, duration=h * steps)

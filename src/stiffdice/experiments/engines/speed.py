@@ -19,7 +19,7 @@ from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, sce
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 TIMED = ("flat-bounce", "tumbling-throw")
 
@@ -38,20 +38,20 @@ def time(
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
     Raises InputError for a number out of range, and an engine that is not installed.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     steps = SAMPLES * max(1, validation.count("steps", steps) // SAMPLES)
     affordable, rounds = validation.number("affordable", affordable, "s", above=0), validation.count("rounds", rounds)
     seconds, spread, taken = np.full((3, len(TIMED), len(names)), np.nan)
     for p, problem in enumerate(PROBLEMS[name] for name in TIMED):
         there = scene_of(problem, scene, scene.ground.stiffness)
-        fit = [k for k, name in enumerate(names) if stepper.unfit(name, there, problem.model) is None]
-        runs = [Launched(stepper.ready(names[k], there, problem.model, steps, SAMPLES)) for k in fit]
-        own = [stepper.own_steps(names[k]) for k in fit]
+        fit = [k for k, name in enumerate(names) if engines.adapter_of(name).unfit(there, problem.model) is None]
+        runs = [Launched(engines.ready(names[k], there, problem.model, steps, SAMPLES)) for k in fit]
+        own = [engines.METHODS[names[k]].own_steps for k in fit]
         counted: Array = np.array([run.ready()().evaluations for run in runs])  # what is not compiled yet is now
         taken[p, fit] = np.where(own, counted, steps)
         seconds[p, fit], spread[p, fit] = interleaved(runs, rounds, affordable)
     attributes = dataset.provenance_attributes("Steps a second", scene, "problem", "method", __name__)
-    attributes |= stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
+    attributes |= engines.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
     grid = ("problem", "method")
     variables = coordinates(problem=TIMED, method=names) | {
         "seconds": quantity(grid, seconds, "median wall time of a run, started before", "s"),

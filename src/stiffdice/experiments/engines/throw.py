@@ -20,7 +20,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL, REFERENCE = "tumbling", "event"
 
@@ -54,19 +54,19 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     """
     samples = validation.count("samples", samples)
     most = validation.number("steps", steps, "1", at_least=samples)
-    reasons = {name: stepper.unfit(name, scene, MODEL) for name in stepper.chosen_from(methods)}
+    reasons = {name: engines.adapter_of(name).unfit(scene, MODEL) for name in engines.chosen_from(methods)}
     names = [name for name, why in reasons.items() if why is None]
     if not names:
         raise InputError(f"methods: none of them can represent the scene: {'; '.join(map(str, reasons.values()))}")
 
     def path(method: str, steps: int, tolerance: float) -> tuple[Array, int]:
-        found = stepper.ready(method, scene, MODEL, steps, samples, tolerance)()()
+        found = engines.ready(method, scene, MODEL, steps, samples, tolerance)()()
         return found.states["position"], found.evaluations
 
     (reference, _), (coarser, _) = (path(REFERENCE, samples, size) for size in (_FINEST, _COARSER))
 
     def efforts(method: str) -> tuple[Any, ...]:
-        own, finest = stepper.own_steps(method), most / stepper.dearness(method)
+        own, finest = engines.METHODS[method].own_steps, most / engines.METHODS[method].dearness
         counts = [samples * max(1, round(finest / part / samples)) for part in _PARTS]
         tried = [(samples, size) for size in _TOLERANCES] if own else [(count, np.nan) for count in counts]
         places, evaluations = zip(*(path(method, *effort) for effort in tried), strict=True)
@@ -82,4 +82,4 @@ def measure(scene: Scene, *, methods: Sequence[str] = METHODS, steps: float = 4e
     found["reference_error"] = quantity("time", apart, "distance of the reference from a coarser one", "m")
     attributes = dataset.provenance_attributes("The throw in every engine", scene, MODEL, "method", __name__)
     unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
-    return xr.Dataset(found, attrs=attributes | stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit})
+    return xr.Dataset(found, attrs=attributes | engines.attributes(names) | {"reference": REFERENCE, "unfit": unfit})

@@ -25,7 +25,7 @@ from stiffdice.experiments.timing import Launched, seconds_of
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
@@ -95,7 +95,7 @@ def _runs(scene: Scene, model: str, steps: int) -> list[Callable[[], object]]:
     if model == "tensor":
         return [Launched(partial(_with_tensor, scene, steps))]
     plain = partial(simulate, scene, model=model, scheme=SCHEME, steps=steps)
-    return [Launched(stepper.ready(SCHEME, scene, model, steps, 1)), partial(plain, every=steps), plain]
+    return [Launched(engines.ready(SCHEME, scene, model, steps, 1)), partial(plain, every=steps), plain]
 
 
 def _with_tensor(scene: Scene, steps: int) -> Callable[[], object]:

@@ -17,9 +17,8 @@ from stiffdice.experiments.measuring import Variable, quantity, states_of
 from stiffdice.experiments.work_precision.problems import SAMPLES, Problem
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import stepper
-from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS
-from stiffdice.simulation.engines.stepper import Path
+from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS, Path
 from stiffdice.simulation.run import simulate
 
 # Schemes whose error does not depend on the step, and that know flat landings only.
@@ -66,7 +65,7 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
     Raises InputError for any other name, and for an engine that is not installed.
     """
     known = methods_for(problem)
-    return known if list(names) == [ALL] else stepper.chosen_from(names, [*known, *STEPPING])
+    return known if list(names) == [ALL] else engines.chosen_from(names, [*known, *STEPPING])
 
 
 def fixed_step(method: str) -> bool:
@@ -93,7 +92,7 @@ def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Ite
 
 def plain(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], Callable[[], Path]]:
     """Return a function that starts a run from the launch, and returns another that makes it step by step."""
-    return stepper.ready(method, scene, problem.model, effort.steps or SAMPLES, SAMPLES, effort.tolerance)
+    return engines.ready(method, scene, problem.model, effort.steps or SAMPLES, SAMPLES, effort.tolerance)
 
 
 def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget: int) -> Path:
@@ -119,7 +118,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
 
 def lag_time(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
-    return stepper.lag(method) * scene.duration / effort.steps if fixed_step(method) else 0.0
+    return engines.adapter_of(method).LAG * scene.duration / effort.steps if fixed_step(method) else 0.0
 
 
 def by_effort(

@@ -31,7 +31,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.engines.registry import PEERS
 
 # What may be taken for right, best first; a peer at the least tolerance it has.
@@ -100,7 +100,7 @@ def measure(
     title = f"Work and precision: {chosen.name}"
     attributes = dataset.provenance_attributes(title, scene, chosen.model, "method", __name__)
     attributes |= {"scene_note": _NOTE, "problem": problem, "samples": SAMPLES, "reference": sources[0]}
-    return xr.Dataset(variables, attrs=attributes | stepper.attributes(names))
+    return xr.Dataset(variables, attrs=attributes | engines.attributes(names))
 
 
 def _climbed(
@@ -112,7 +112,7 @@ def _climbed(
     """
     rungs: list[dict[str, float]] = []
     too_dear = 0
-    most = budget / stepper.dearness(method)
+    most = budget / engines.METHODS[method].dearness
     growth = 10 ** (1 / per_decade) if fixed_step(method) else 1.0  # known beforehand
     for effort in efforts.ladder(scene, method, per_decade, steps):
         if len(rungs) > 1 and rungs[-1]["evaluations_computed"] * growth > most:

@@ -23,7 +23,7 @@ from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Pro
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 # A run on a ladder, to be timed.
 Rung = tuple[Effort, Callable[[], object]]
@@ -72,7 +72,7 @@ def time(
     title = f"Time of work and precision: {chosen.name}"
     attributes = dataset.provenance_attributes(title, scene, chosen.model, "method", __name__)
     attributes |= {"problem": problem, "samples": SAMPLES, "rounds": rounds}
-    return xr.Dataset(variables, attrs=attributes | stepper.attributes(names) | machine())
+    return xr.Dataset(variables, attrs=attributes | engines.attributes(names) | machine())
 
 
 def _climbed(problem: Problem, scene: Scene, method: str, per_decade: int, affordable: float) -> list[Rung]:

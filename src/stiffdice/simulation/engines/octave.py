@@ -34,7 +34,6 @@ class Octave(Engine):
     BATCH = 4000  # steps of one request: about a second of work, so that an orphan does not outlive it
 
     def __post_init__(self) -> None:
-        """Take the scene's numbers, and the state of the launch."""
         p, model = physics_of(self.scene), self.model
         flags = model in TURNING, model in TOUCHING, model != "vertical", self.scene.ground.contact == "gated"
         rest = p.mass, p.inertia, p.node_weight, p.stiffness, p.damping, p.friction, p.cutoff, p.nx, p.ny, p.nz

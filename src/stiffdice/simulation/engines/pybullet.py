@@ -27,14 +27,13 @@ from __future__ import annotations
 import math
 import os
 import sys
-import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import TOUCHING, States, physics_of
+from stiffdice.dynamics.state import TOUCHING, Array, physics_of
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import RigidBody
 
@@ -55,6 +54,7 @@ def _quiet() -> Iterator[None]:
 
 with _quiet():  # it tells when it was built
     import pybullet
+    from pybullet_utils.bullet_client import BulletClient
 
 # Of the spheres that stand for the nodes, in units of the cube's radius: the arm of friction is too long by it.
 _SPHERE = 1e-6
@@ -77,70 +77,18 @@ class Pybullet(RigidBody):
     SCHEME = "sequential_impulse"
 
     def __post_init__(self) -> None:
-        """Set up Bullet's model of the scene, at the launch."""
         super().__post_init__()
-        self._batch, self._client = 0, pybullet.connect(pybullet.DIRECT)
-        weakref.finalize(self, pybullet.disconnect, self._client)
-        pybullet.setGravity(0, 0, -self.scene.gravity, physicsClientId=self._client)
-        self._set(_top_speed(self.scene, self.start))
-        self._cube = self._add_cube()
-        if self.model in TOUCHING:
-            self._add_ground()
-
-    def advance(self, states: States, every: int) -> int:
-        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
-        rows = np.empty((len(states), 13))
-        for row in rows:
-            self._step(every)
-            place, turn = pybullet.getBasePositionAndOrientation(self._cube, self._client)
-            velocity, spin = pybullet.getBaseVelocity(self._cube, self._client)
-            row[:] = *place, turn[3], *turn[:3], *velocity, *spin
-        rows[~np.isfinite(rows).all(axis=1)] = np.nan
-        places, turns, velocities, spins = np.split(rows, [3, 7, 10], axis=1)
-        self.put(states, places[:, self.axes], velocities[:, self.axes], turns, spins)
-        return len(states) * every
-
-    def _step(self, steps: int) -> None:
-        while steps:
-            batch = min(_BATCH, 1 << steps.bit_length() - 1)
-            if batch != self._batch:
-                pybullet.setPhysicsEngineParameter(
-                    fixedTimeStep=self.h * batch, numSubSteps=batch, physicsClientId=self._client
-                )
-                self._batch = batch
-            pybullet.stepSimulation(self._client)
-            steps -= batch
-
-    def _set(self, speed: float) -> None:
-        scene = self.scene
-        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self.h
-        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self.h / scene.cube.mass
-        # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
-        residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
-        pybullet.setPhysicsEngineParameter(
-            numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
-            solverResidualThreshold=residual * residual,
-            contactBreakingThreshold=speed * self.h + 4 * _SPHERE * scene.cube.radius,
-            contactSlop=0,
-            restitutionVelocityThreshold=0,
-            enableConeFriction=1,
-            physicsClientId=self._client,
-        )
-
-    def _add_cube(self) -> int:
         cube, ground, launch = self.scene.cube, self.scene.ground, self.start
-        nodes = launch["node_offset"]
-        shape = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_SPHERE] * len(nodes),
-            radii=[_SPHERE * cube.radius] * len(nodes),
-            collisionFramePositions=nodes.tolist(),
-            physicsClientId=self._client,
-        )
-        body: int = pybullet.createMultiBody(
-            cube.mass, shape, basePosition=launch["position"].tolist(), physicsClientId=self._client
-        )
-        pybullet.changeDynamics(
-            body,
+        bullet = self._bullet = BulletClient(pybullet.DIRECT)
+        bullet.setGravity(0, 0, -self.scene.gravity)
+        self._batch = 0
+        self._set(_top_speed(self.scene, launch))
+        nodes, size = launch["node_offset"].tolist(), _SPHERE * cube.radius
+        spheres = [bullet.GEOM_SPHERE] * len(nodes)
+        shape = bullet.createCollisionShapeArray(spheres, [size] * len(nodes), collisionFramePositions=nodes)
+        self._cube = bullet.createMultiBody(cube.mass, shape, basePosition=launch["position"].tolist())
+        bullet.changeDynamics(
+            self._cube,
             -1,
             contactStiffness=ground.stiffness,
             contactDamping=ground.damping,
@@ -148,27 +96,44 @@ class Pybullet(RigidBody):
             localInertiaDiagonal=[self.inertia if self.turns else 0] * 3,
             maxJointVelocity=_ENDLESS,
             **_PLAIN,
-            physicsClientId=self._client,
         )
         spin = self.spin if self.turns else np.zeros(3)
-        pybullet.resetBaseVelocity(body, launch["velocity"].tolist(), spin.tolist(), self._client)
-        return body
+        bullet.resetBaseVelocity(self._cube, launch["velocity"].tolist(), spin.tolist())
+        if self.model in TOUCHING:
+            normal = np.array(ground.normal)
+            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=normal.tolist())
+            body = bullet.createMultiBody(0, plane, basePosition=(-size * normal).tolist())
+            # The frictions of two bodies are multiplied.
+            bullet.changeDynamics(body, -1, contactStiffness=_ENDLESS, contactDamping=0, lateralFriction=1, **_PLAIN)
 
-    def _add_ground(self) -> None:
-        normal = np.array(self.scene.ground.normal)
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_PLANE, planeNormal=normal.tolist(), physicsClientId=self._client
-        )
-        lowered = (-_SPHERE * self.scene.cube.radius * normal).tolist()
-        body = pybullet.createMultiBody(0, shape, basePosition=lowered, physicsClientId=self._client)
-        pybullet.changeDynamics(
-            body,
-            -1,
-            contactStiffness=_ENDLESS,
-            contactDamping=0,
-            lateralFriction=1,  # the two are multiplied
-            **_PLAIN,
-            physicsClientId=self._client,
+    def _next(self, row: Array, every: int) -> int:
+        left = every
+        while left:
+            batch = min(_BATCH, 1 << left.bit_length() - 1)
+            if batch != self._batch:
+                self._bullet.setPhysicsEngineParameter(fixedTimeStep=self.h * batch, numSubSteps=batch)
+                self._batch = batch
+            self._bullet.stepSimulation()
+            left -= batch
+        place, (x, y, z, w) = self._bullet.getBasePositionAndOrientation(self._cube)
+        velocity, spin = self._bullet.getBaseVelocity(self._cube)
+        row[:] = (*place, w, x, y, z, *velocity, *spin) if self.turns else (*place[self.axes], *velocity[self.axes])
+        return every
+
+    def _set(self, speed: float) -> None:
+        """Set the solver for speeds [m/s] up to this one."""
+        scene = self.scene
+        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self.h
+        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self.h / scene.cube.mass
+        # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
+        residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
+        self._bullet.setPhysicsEngineParameter(
+            numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
+            solverResidualThreshold=residual * residual,
+            contactBreakingThreshold=speed * self.h + 4 * _SPHERE * scene.cube.radius,
+            contactSlop=0,
+            restitutionVelocityThreshold=0,
+            enableConeFriction=1,
         )
 
 
