@@ -21,15 +21,16 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.simd import bits, store, where
-from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
+from stiffdice.dynamics.state import TOUCHING, Array, States
 from stiffdice.dynamics.vector import Vector, dot, inlined
 from stiffdice.integrators import batched_kernel, member_block
 from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.batched_kernel import Numbers
-from stiffdice.integrators.member_block import Alone, Body, row_of
+from stiffdice.integrators.member_block import Alone, row_of
 from stiffdice.simulation import fast_forward
+from stiffdice.simulation.criteria import energy
 from stiffdice.simulation.criteria.registry import CRITERIA, observe, open_of
-from stiffdice.simulation.reference import distance
+from stiffdice.simulation.criteria.trajectory import distance
 from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, until_kept
 
 SCHEME = "symplectic_euler"
@@ -94,13 +95,6 @@ def _same(a: Vector, b: Vector) -> Any:
 
 
 @inlined
-def _energy(e: Balance, body: Body) -> Any:
-    """Return kinetic energy + m g z, the velocity at the time of the place [J]."""
-    moving = e.half_mass * dot(body.velocity, body.velocity) + e.half_per_inertia * dot(body.momentum, body.momentum)
-    return ((moving - dot(e.lagging, body.velocity)) + dot(e.weight, body.place)) + e.offset
-
-
-@inlined
 def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
     width, e = common.width, common.e
@@ -111,17 +105,19 @@ def _run_on(common: Common, block: Array) -> int:
     while True:
         new = batched_kernel.step(common.system.model, common.posture, common.system.law, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
-        energy = _energy(e, new)
+        # Kinetic energy + m g z, the velocity at the time of the place.
+        moving = e.half_mass * dot(new.velocity, new.velocity) + e.half_per_inertia * dot(new.momentum, new.momentum)
+        total = ((moving - dot(e.lagging, new.velocity)) + dot(e.weight, new.place)) + e.offset
         up = now > 0.0
         swing = swing_square(e.omega, common.k.h, now + e.sag, new.velocity.z)
         settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
         size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
         unturned = batched_kernel.unturned(common.k, new)
-        happens = (up ^ (clearance > 0.0)) | (up & (energy > limit)) | (~up & settles)
+        happens = (up ^ (clearance > 0.0)) | (up & (total > limit)) | (~up & settles)
         happens = happens | ~(size < math.inf) | unturned
         happening = bits(live & (happens | (done >= due)))
         done = done + 1.0
-        flying = where(up, max(worst, energy), worst)
+        flying = where(up, max(worst, total), worst)
         if happening != 0:
             member_block.write(block, new)
             still = _same(new.velocity, body.velocity) & _same(new.place, body.place) & _same(new.a, body.a)
@@ -167,23 +163,16 @@ def _only_compared(common: Common, axes: Array, block: Array, lane: int, member:
 
 
 @njit
-def _lies(sight: Any, memory: Any) -> bool:
-    """Return whether the cube has never left the ground, and goes on moving."""
-    return memory.energy[3] > 0.0 and sight.still == 0.0
-
-
-@njit
 def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Member, samples: States, done: int) -> int:
     """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
     state, sight, memory, _ = member
     member_block.leave(common.system.model, axes, block, lane, state)
     sight.speed, sight.height, sight.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     sight.speed_before = block[EARLIER, lane]
-    ratio = 1.0 + (block[WORST, lane] - memory.energy[1]) / memory.energy[2]
-    memory.energy[0] = max(memory.energy[0], ratio)
+    energy.count(memory.energy, block[WORST, lane])
     step = done + int(block[DONE, lane])
-    every_counts = member.reference.horizon >= sight.time or _lies(sight, memory)
-    if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not every_counts:
+    lies = memory.energy[3] > 0.0 and sight.still == 0.0  # has never left the ground, and goes on moving
+    if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not (member.reference.horizon >= sight.time or lies):
         step = until_kept(common.limits, done)  # the others would not change anything, either
     return step if _show(common, member, samples, step, 0) else step - 1
 
@@ -209,7 +198,7 @@ def _fast_forward(common: Common, member: Member, samples: States, done: int, le
         # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
         # without ever having left it.
         known = sight.held > held or fast_forward.follows(scheme, system, member)
-        if known or sight.flight == 1.0 or _lies(sight, memory):
+        if known or sight.flight == 1.0 or (memory.energy[3] > 0.0 and sight.still == 0.0):
             most = 1
         elif sight.flight > 0.0 and fast_forward.undisturbed(system, sight) > 0.0:
             most = min(most, LONGEST)
@@ -287,8 +276,15 @@ def start(task: Task) -> Callable[[], bool] | None:
     scene, model = setup.scene, setup.model
     if setup.scheme != SCHEME or model not in TOUCHING:
         return None
-    axes, h = member_block.axes_of(scene), setup.step_size
-    k, e = batched_kernel.numbers_of(system.physics, axes, h), _balance(system.physics, axes, h, members.sight)
+    axes, h, physics, sag = member_block.axes_of(scene), setup.step_size, system.physics, members.sight["sag"][0]
+    up, behind = axes[:, 2], schemes.LAGS[SCHEME] * h * physics.gravity
+    with np.errstate(all="ignore"):
+        weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
+        per_inertia = float(np.float64(0.5) / physics.inertia)
+        omega = float(np.sqrt(4 * physics.stiffness / np.float64(physics.mass)))
+    along, offset = (Vector(*weight.tolist()), Vector(*lagging.tolist())), 0.5 * physics.mass * behind * behind
+    k = batched_kernel.numbers_of(physics, axes, h)
+    e = Balance(0.5 * physics.mass, per_inertia, *along, offset, omega, float(sag))
     if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
@@ -305,21 +301,3 @@ def start(task: Task) -> Callable[[], bool] | None:
         return waiting > 0
 
     return advance
-
-
-def _balance(physics: Physics, axes: Array, h: float, sight: npt.NDArray[np.void]) -> Balance:
-    up = axes[:, 2]
-    behind = schemes.LAGS[SCHEME] * h * physics.gravity
-    with np.errstate(all="ignore"):
-        weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
-        per_inertia = np.float64(0.5) / physics.inertia
-        omega = np.sqrt(4 * physics.stiffness / np.float64(physics.mass))
-    return Balance(
-        0.5 * physics.mass,
-        float(per_inertia),
-        Vector(*weight.tolist()),
-        Vector(*lagging.tolist()),
-        0.5 * physics.mass * behind * behind,
-        float(omega),
-        float(sight["sag"][0]),
-    )

@@ -120,7 +120,7 @@ def shard_pattern(sweep: Sweep) -> xr.Dataset:
 def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
     code = "stiffdice.sweep.shard", *backend.code_of(sweep.simulator)
     attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
-    attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
+    attributes |= {"simulator": sweep.simulator, "simulator_version": backend.version_of(sweep.simulator)}
     attributes |= dataset.config_attributes("shard", sweep.of_runs)
     attributes["seed"] = sweep.seed
     attributes["model_reason"] = sweep.model_reason

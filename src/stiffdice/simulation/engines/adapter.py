@@ -15,7 +15,6 @@ from stiffdice.dynamics.rotation import along, matrices, turned
 from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of, start_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import fixed_step
 
 
 @dataclass(eq=False)
@@ -75,7 +74,7 @@ class Scheme(Engine):
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
         whole = np.concatenate([self._state, states])
-        evaluations = fixed_step.advance(*self._tags, self._physics, whole, every, self.h, self.tolerance)
+        evaluations = schemes.advance(*self._tags, self._physics, whole, every, self.h, self.tolerance)
         states[:], self._state = whole[1:], whole[-1:]
         return int(evaluations)
 

@@ -35,18 +35,13 @@ def march(task: Task, progress: Callable[[float], None] | None) -> None:
             members.evaluations[m] += engine.advance(states, 1)
             asked += len(states)
             if own and members.evaluations[m] >= budget:
-                states, goes_on = states[: _known(states)], False
+                ended = ~np.isfinite(states["position"]).all(axis=1)
+                states, goes_on = states[: ended.argmax() if ended.any() else None], False
                 members.sight["work"][m] = members.evaluations[m]
             goes_on &= _look(task.system, task.limits, members, m, states)
             chunk = min(_MOST, 2 * chunk)
             if progress is not None:
                 progress((m + members.steps_done[m] / most) / count)
-
-
-def _known(states: States) -> int:
-    """Return before which state a run was ended."""
-    ended = ~np.isfinite(states["position"]).all(axis=1)
-    return int(ended.argmax()) if ended.any() else len(states)
 
 
 @njit(cache=True)

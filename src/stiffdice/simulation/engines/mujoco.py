@@ -29,7 +29,6 @@ import numpy as np
 
 from stiffdice.dynamics.rotation import matrices
 from stiffdice.dynamics.state import TOUCHING, Array, States
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import RigidBody
 
 _IMPEDANCE = 1e-4  # mjMINIMP
@@ -93,7 +92,16 @@ class Mujoco(RigidBody):
 def _compiled(run: Mujoco) -> mujoco.MjModel:
     """Return the scene of a run as MuJoCo takes it."""
     spec, scene = mujoco.MjSpec(), run.scene
-    _set(spec.option, scene, run.h)
+    option = spec.option
+    option.timestep = run.h
+    option.gravity = [0.0, 0.0, -scene.gravity]
+    option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.tolerance, option.iterations = _TOLERANCE, _ITERATIONS
+    option.impratio = _SOFT * (1 - _IMPEDANCE) / _IMPEDANCE / _HARD
+    option.disableflags = sum(int(mujoco.mjtDisableBit.__members__[f"mjDSBL_{name}"]) for name in _OFF)
     cube, ground, away = scene.cube, scene.ground, {"contype": 0, "conaffinity": 0}
     body = spec.worldbody.add_body(name="cube")
     if run.turns:
@@ -127,15 +135,3 @@ def _compiled(run: Mujoco) -> mujoco.MjModel:
     # The first number is of no effect, but both at zero stand for the normal direction's. MuJoCo divides by d.
     compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / run.h
     return compiled
-
-
-def _set(option: mujoco.MjOption, scene: Scene, h: float) -> None:
-    option.timestep = h
-    option.gravity = [0.0, 0.0, -scene.gravity]
-    option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.tolerance, option.iterations = _TOLERANCE, _ITERATIONS
-    option.impratio = _SOFT * (1 - _IMPEDANCE) / _IMPEDANCE / _HARD
-    option.disableflags = sum(int(mujoco.mjtDisableBit.__members__[f"mjDSBL_{name}"]) for name in _OFF)

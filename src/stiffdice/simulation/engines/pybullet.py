@@ -34,7 +34,6 @@ import numpy as np
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import TOUCHING, Array, physics_of
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import RigidBody
 
 
@@ -78,12 +77,27 @@ class Pybullet(RigidBody):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        cube, ground, launch = self.scene.cube, self.scene.ground, self.start
+        scene, cube, ground, launch = self.scene, self.scene.cube, self.scene.ground, self.start
         bullet = self._bullet = BulletClient(pybullet.DIRECT)
-        bullet.setGravity(0, 0, -self.scene.gravity)
+        bullet.setGravity(0, 0, -scene.gravity)
         self._batch = 0
-        self._set(_top_speed(self.scene, launch))
-        nodes, size = launch["node_offset"].tolist(), _SPHERE * cube.radius
+        nodes, size, p = launch["node_offset"].tolist(), _SPHERE * cube.radius, physics_of(scene)
+        # A speed [m/s] that no node exceeds, unless the run gains energy.
+        turning = math.hypot(*launch["angular_momentum"]) / math.sqrt(p.mass * p.inertia)
+        speed = math.hypot(math.hypot(*launch["velocity"]) + p.gravity * scene.duration, turning)
+        speed *= 1 + p.reach * math.sqrt(p.mass / p.inertia)
+        stride = linear_theory.contact_frequency(ground.stiffness, cube.mass) * self.h
+        damped = linear_theory.BOUNCE_NODES * ground.damping * self.h / cube.mass
+        # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
+        residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
+        bullet.setPhysicsEngineParameter(
+            numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
+            solverResidualThreshold=residual * residual,
+            contactBreakingThreshold=speed * self.h + 4 * size,
+            contactSlop=0,
+            restitutionVelocityThreshold=0,
+            enableConeFriction=1,
+        )
         spheres = [bullet.GEOM_SPHERE] * len(nodes)
         shape = bullet.createCollisionShapeArray(spheres, [size] * len(nodes), collisionFramePositions=nodes)
         self._cube = bullet.createMultiBody(cube.mass, shape, basePosition=launch["position"].tolist())
@@ -120,29 +134,5 @@ class Pybullet(RigidBody):
         row[:] = (*place, w, x, y, z, *velocity, *spin) if self.turns else (*place[self.axes], *velocity[self.axes])
         return every
 
-    def _set(self, speed: float) -> None:
-        """Set the solver for speeds [m/s] up to this one."""
-        scene = self.scene
-        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self.h
-        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self.h / scene.cube.mass
-        # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
-        residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
-        self._bullet.setPhysicsEngineParameter(
-            numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
-            solverResidualThreshold=residual * residual,
-            contactBreakingThreshold=speed * self.h + 4 * _SPHERE * scene.cube.radius,
-            contactSlop=0,
-            restitutionVelocityThreshold=0,
-            enableConeFriction=1,
-        )
-
 
 _PLAIN = {"restitution": 0, "spinningFriction": 0, "rollingFriction": 0, "linearDamping": 0, "angularDamping": 0}
-
-
-def _top_speed(scene: Scene, launch: np.void) -> float:
-    """Return a speed [m/s] that no node exceeds within the duration, unless the run gains energy."""
-    physics = physics_of(scene)
-    fall = math.hypot(*launch["velocity"]) + physics.gravity * scene.duration
-    turning = math.hypot(*launch["angular_momentum"]) / math.sqrt(physics.mass * physics.inertia)
-    return math.hypot(fall, turning) * (1 + physics.reach * math.sqrt(physics.mass / physics.inertia))

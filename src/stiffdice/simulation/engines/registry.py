@@ -20,6 +20,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import Engine, Scheme
+from stiffdice.simulation.engines.numpy_loop import NumpyLoop
 
 
 class Peer(NamedTuple):
@@ -62,12 +63,6 @@ def _octave() -> type[Engine]:
     return Octave
 
 
-def _numpy() -> type[Engine]:
-    from stiffdice.simulation.engines.numpy_loop import NumpyLoop
-
-    return NumpyLoop
-
-
 def _scipy(solver: str) -> type[Engine]:
     from stiffdice.simulation.engines import scipy_ivp
 
@@ -85,7 +80,7 @@ ENGINES: dict[str, Peer] = {
     "drake": Peer(_drake, "Drake", "the package drake", dearness=300),
     "scipy": _peer_of_scipy("lsoda", "LSODA"),
     "octave": Peer(_octave, "GNU Octave", "the program octave-cli", "your system's package manager", 3000),
-    "numpy": Peer(_numpy, "NumPy loop", "the package numpy", "make install", 500),
+    "numpy": Peer(lambda: NumpyLoop, "NumPy loop", "the package numpy", "make install", 500),
 }
 
 # Methods that control their own error and are tried beside the schemes, whatever else is asked.
