@@ -18,7 +18,6 @@ from stiffdice.errors import InputError, NotInstalledError, StiffdiceError
 from stiffdice.experiments.engines.single_bounce import flat
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene, from_mapping
-from stiffdice.simulation.engines import driver
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.engines.registry import ENGINES, METHODS, adapter_of
 from stiffdice.simulation.initial_conditions import phased
@@ -98,8 +97,8 @@ def test_an_ensemble_is_judged_as_ours_is(monkeypatch):
     ours = simulate(scene, model="sliding", steps=430, members=members, criteria=asked, stop=asked)
     assert len(set(ours.steps_done)) == 5
     assert {*ours.verdict} == {Verdict.PASSED, Verdict.ENERGY_GREW}
-    for chunk in (driver._FIRST, 7):
-        monkeypatch.setattr(driver, "_FIRST", chunk)
+    for chunk in (engines._FIRST, 7):
+        monkeypatch.setattr(engines, "_FIRST", chunk)
         theirs = simulate(
             scene, model="sliding", simulator="numpy", steps=430, members=members, criteria=asked, stop=asked
         )
@@ -141,11 +140,11 @@ def test_a_run_that_fails_is_a_result(engine, model):
     assert engine == "scipy" or run.steps_done == ours.steps_done
 
 
-@pytest.mark.parametrize("chunk", [driver._FIRST, 17])
+@pytest.mark.parametrize("chunk", [engines._FIRST, 17])
 def test_lsoda_tells_the_exact_state_after_each_of_our_steps(chunk, monkeypatch):
     """However often it is begun anew."""
-    monkeypatch.setattr(driver, "_FIRST", chunk)
-    monkeypatch.setattr(driver, "_MOST", chunk)
+    monkeypatch.setattr(engines, "_FIRST", chunk)
+    monkeypatch.setattr(engines, "_MOST", chunk)
     scene = from_mapping({"duration": 3.0}, "as_written")
     theirs = simulate(scene, model="sliding", simulator="scipy", steps=400, tolerance=1e-11, every=1)
     exact = simulate(scene, model="sliding", scheme="exact", steps=400, every=1)
