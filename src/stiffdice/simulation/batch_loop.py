@@ -56,13 +56,20 @@ ROWS = member_block.ROWS + 14
 _ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("trajectory")
 
 
-class Balance(NamedTuple):
-    """What energy, flights and rest are told by: m/2, 1/(2I), and along the ground's axes the weight [N].
+class Common(NamedTuple):
+    """What is the same of all members; scheme, width and posture are tags.
 
-    lagging [kg m/s] and offset [J]: what the kinetic energy lacks as the velocity lags behind the place. sag [m]:
-    as in `monitor.py`; omega [1/s]: of a bounce on four nodes.
+    Energy, flights and rest are told by m/2, 1/(2I), and along the ground's axes the weight [N]. lagging [kg m/s] and
+    offset [J]: what the kinetic energy lacks as the velocity lags behind the place. omega [1/s]: of a bounce on four
+    nodes; sag [m]: as in `monitor.py`.
     """
 
+    scheme: Any
+    width: Any
+    posture: Any
+    system: System
+    k: Numbers
+    limits: Limits
     half_mass: float
     half_per_inertia: float
     weight: Vector
@@ -70,18 +77,6 @@ class Balance(NamedTuple):
     offset: float
     omega: float
     sag: float
-
-
-class Common(NamedTuple):
-    """What is the same of all members; scheme, width and posture are tags."""
-
-    scheme: Any
-    width: Any
-    posture: Any
-    system: System
-    k: Numbers
-    e: Balance
-    limits: Limits
 
 
 @inlined
@@ -97,7 +92,7 @@ def _same(a: Vector, b: Vector) -> Any:
 @inlined
 def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
-    width, e = common.width, common.e
+    width = common.width
     body = member_block.read(width, block)
     done, worst, clearance = row_of(width, block, DONE), row_of(width, block, WORST), row_of(width, block, CLEARANCE)
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
@@ -106,10 +101,11 @@ def _run_on(common: Common, block: Array) -> int:
         new = batched_kernel.step(common.system.model, common.posture, common.system.law, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         # Kinetic energy + m g z, the velocity at the time of the place.
-        moving = e.half_mass * dot(new.velocity, new.velocity) + e.half_per_inertia * dot(new.momentum, new.momentum)
-        total = ((moving - dot(e.lagging, new.velocity)) + dot(e.weight, new.place)) + e.offset
+        turning = common.half_per_inertia * dot(new.momentum, new.momentum)
+        moving = common.half_mass * dot(new.velocity, new.velocity) + turning
+        total = ((moving - dot(common.lagging, new.velocity)) + dot(common.weight, new.place)) + common.offset
         up = now > 0.0
-        swing = swing_square(e.omega, common.k.h, now + e.sag, new.velocity.z)
+        swing = swing_square(common.omega, common.k.h, now + common.sag, new.velocity.z)
         settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
         size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
         unturned = batched_kernel.unturned(common.k, new)
@@ -133,16 +129,6 @@ def _run_on(common: Common, block: Array) -> int:
             store(block, BEFORE, clearance)
             return happening
         body, clearance, worst, earlier = new, now, flying, body.velocity.z
-
-
-@njit
-def _show(common: Common, member: Member, samples: States, step: int, flown: int) -> bool:
-    """Show a step to all who watch, and keep it; return whether every number is in range."""
-    observe(common.system, member, step, flown)
-    if member.memory.finite[0] > 0.0:
-        return False
-    keep(common.limits, samples, member.state, step)
-    return True
 
 
 @njit
@@ -174,7 +160,11 @@ def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Memb
     lies = memory.energy[3] > 0.0 and sight.still == 0.0  # has never left the ground, and goes on moving
     if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not (member.reference.horizon >= sight.time or lies):
         step = until_kept(common.limits, done)  # the others would not change anything, either
-    return step if _show(common, member, samples, step, 0) else step - 1
+    observe(common.system, member, step, 0)
+    if memory.finite[0] > 0.0:
+        return step - 1
+    keep(common.limits, samples, state, step)
+    return step
 
 
 @njit
@@ -187,8 +177,10 @@ def _fast_forward(common: Common, member: Member, samples: States, done: int, le
         flown = fast_forward.fly(scheme, system, member, most)
         if flown > 0:
             moved = True
-            if _show(common, member, samples, done + flown, flown):
+            observe(system, member, done + flown, flown)
+            if memory.finite[0] == 0.0:
                 done += flown
+                keep(limits, samples, member.state, done)
             continue
         if left <= 0:
             break
@@ -282,14 +274,15 @@ def start(task: Task) -> Callable[[], bool] | None:
         weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
         per_inertia = float(np.float64(0.5) / physics.inertia)
         omega = float(np.sqrt(4 * physics.stiffness / np.float64(physics.mass)))
-    along, offset = (Vector(*weight.tolist()), Vector(*lagging.tolist())), 0.5 * physics.mass * behind * behind
-    k = batched_kernel.numbers_of(physics, axes, h)
-    e = Balance(0.5 * physics.mass, per_inertia, *along, offset, omega, float(sag))
-    if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
+    k, half_mass = batched_kernel.numbers_of(physics, axes, h), 0.5 * physics.mass
+    offset = half_mass * behind * behind
+    if not np.isfinite([*k[:-1], *k.gain, half_mass, per_inertia, *weight, *lagging, offset, omega, sag]).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)
-    common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, e, task.limits)
+    along = Vector(*weight.tolist()), Vector(*lagging.tolist())
+    energies = half_mass, per_inertia, *along, offset, omega, float(sag)
+    common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, task.limits, *energies)
     lanes = member_block.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
     waiting = 0
