@@ -36,6 +36,10 @@ class Engine(ABC):
     tolerance: float = schemes.TOLERANCE
     most: int | None = schemes.BUDGET
 
+    @abstractmethod
+    def __post_init__(self) -> None:
+        """Set up the engine, at the launch."""
+
     @classmethod
     def unfit(cls, scene: Scene, model: str) -> str | None:
         """Return in one sentence why the engine cannot represent a scene and model, or None if it can."""
