@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -53,7 +54,6 @@ def _quiet() -> Iterator[None]:
 
 with _quiet():  # it tells when it was built
     import pybullet
-    from pybullet_utils.bullet_client import BulletClient
 
 # Of the spheres that stand for the nodes, in units of the cube's radius: the arm of friction is too long by it.
 _SPHERE = 1e-6
@@ -78,8 +78,9 @@ class Pybullet(RigidBody):
     def __post_init__(self) -> None:
         super().__post_init__()
         scene, cube, ground, launch = self.scene, self.scene.cube, self.scene.ground, self.start
-        bullet = self._bullet = BulletClient(pybullet.DIRECT)
-        bullet.setGravity(0, 0, -scene.gravity)
+        here = self._here = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
+        weakref.finalize(self, pybullet.disconnect, **here)
+        pybullet.setGravity(0, 0, -scene.gravity, **here)
         self._batch = 0
         nodes, size, p = launch["node_offset"].tolist(), _SPHERE * cube.radius, physics_of(scene)
         # A speed [m/s] that no node exceeds, unless the run gains energy.
@@ -90,18 +91,19 @@ class Pybullet(RigidBody):
         damped = linear_theory.BOUNCE_NODES * ground.damping * self.h / cube.mass
         # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
         residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
-        bullet.setPhysicsEngineParameter(
+        pybullet.setPhysicsEngineParameter(
             numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
             solverResidualThreshold=residual * residual,
             contactBreakingThreshold=speed * self.h + 4 * size,
             contactSlop=0,
             restitutionVelocityThreshold=0,
             enableConeFriction=1,
+            **here,
         )
-        spheres = [bullet.GEOM_SPHERE] * len(nodes)
-        shape = bullet.createCollisionShapeArray(spheres, [size] * len(nodes), collisionFramePositions=nodes)
-        self._cube = bullet.createMultiBody(cube.mass, shape, basePosition=launch["position"].tolist())
-        bullet.changeDynamics(
+        spheres = [pybullet.GEOM_SPHERE] * len(nodes)
+        shape = pybullet.createCollisionShapeArray(spheres, [size] * len(nodes), collisionFramePositions=nodes, **here)
+        self._cube = pybullet.createMultiBody(cube.mass, shape, basePosition=launch["position"].tolist(), **here)
+        pybullet.changeDynamics(
             self._cube,
             -1,
             contactStiffness=ground.stiffness,
@@ -110,27 +112,30 @@ class Pybullet(RigidBody):
             localInertiaDiagonal=[self.inertia if self.turns else 0] * 3,
             maxJointVelocity=_ENDLESS,
             **_PLAIN,
+            **here,
         )
         spin = self.spin if self.turns else np.zeros(3)
-        bullet.resetBaseVelocity(self._cube, launch["velocity"].tolist(), spin.tolist())
+        pybullet.resetBaseVelocity(self._cube, launch["velocity"].tolist(), spin.tolist(), **here)
         if self.model in TOUCHING:
             normal = np.array(ground.normal)
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=normal.tolist())
-            body = bullet.createMultiBody(0, plane, basePosition=(-size * normal).tolist())
+            plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=normal.tolist(), **here)
+            body = pybullet.createMultiBody(0, plane, basePosition=(-size * normal).tolist(), **here)
             # The frictions of two bodies are multiplied.
-            bullet.changeDynamics(body, -1, contactStiffness=_ENDLESS, contactDamping=0, lateralFriction=1, **_PLAIN)
+            pybullet.changeDynamics(
+                body, -1, contactStiffness=_ENDLESS, contactDamping=0, lateralFriction=1, **_PLAIN, **here
+            )
 
     def _next(self, row: Array, every: int) -> int:
         left = every
         while left:
             batch = min(_BATCH, 1 << left.bit_length() - 1)
             if batch != self._batch:
-                self._bullet.setPhysicsEngineParameter(fixedTimeStep=self.h * batch, numSubSteps=batch)
+                pybullet.setPhysicsEngineParameter(fixedTimeStep=self.h * batch, numSubSteps=batch, **self._here)
                 self._batch = batch
-            self._bullet.stepSimulation()
+            pybullet.stepSimulation(**self._here)
             left -= batch
-        place, (x, y, z, w) = self._bullet.getBasePositionAndOrientation(self._cube)
-        velocity, spin = self._bullet.getBaseVelocity(self._cube)
+        place, (x, y, z, w) = pybullet.getBasePositionAndOrientation(self._cube, **self._here)
+        velocity, spin = pybullet.getBaseVelocity(self._cube, **self._here)
         row[:] = (*place, w, x, y, z, *velocity, *spin) if self.turns else (*place[self.axes], *velocity[self.axes])
         return every
 
