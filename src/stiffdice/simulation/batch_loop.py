@@ -98,7 +98,7 @@ def _run_on(common: Common, block: Array) -> int:
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
-        new = batched_kernel.step(common.system.model, common.posture, common.system.law, common.k, body)
+        new = batched_kernel.step(common.system.model, common.posture, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         # Kinetic energy + m g z, the velocity at the time of the place.
         turning = common.half_per_inertia * dot(new.momentum, new.momentum)
@@ -276,7 +276,8 @@ def start(task: Task) -> Callable[[], bool] | None:
         omega = float(np.sqrt(4 * physics.stiffness / np.float64(physics.mass)))
     k, half_mass = batched_kernel.numbers_of(physics, axes, h), 0.5 * physics.mass
     offset = half_mass * behind * behind
-    if not np.isfinite([*k[:-1], *k.gain, half_mass, per_inertia, *weight, *lagging, offset, omega, sag]).all():
+    numbers = [*k._replace(onset=0.0)[:-1], *k.gain, half_mass, per_inertia, *weight, *lagging, offset, omega, sag]
+    if not np.isfinite(numbers).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)

@@ -14,13 +14,13 @@ import xarray as xr
 from stiffdice import __version__
 from stiffdice.dynamics import contact, linear_theory
 from stiffdice.dynamics.code_digest import code_digest
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
 from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
@@ -42,7 +42,7 @@ MEASURE_ATTRIBUTES = {
     criterion.MEASURE: {"long_name": criterion.LONG_NAME, "units": "1"} for criterion in CRITERIA.values()
 }
 CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
-    "contact": schema.attributes_of("shard", "contact", list(LAWS)),
+    "contact": schema.attributes_of("shard", "contact", list(CONTACT_LAWS)),
     **{name: schema.attributes_of("shard", name) for name in ("stiffness", "steps", "omega_h")},
 }
 

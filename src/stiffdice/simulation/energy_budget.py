@@ -29,7 +29,6 @@ import xarray as xr
 from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import (
-    LAWS,
     height_of,
     node_force,
     node_velocity,
@@ -123,16 +122,16 @@ def ledger(
     """
     validation.choice("scheme", scheme, BOOKED)
     setup = backend.setup_of(scene, model, backend.OURS, scheme, steps)
-    physics, h, lag, law = physics_of(scene), setup.step_size, setup.lag, LAWS[scene.ground.contact]
+    physics, h, lag = physics_of(scene), setup.step_size, setup.lag
     rows = np.zeros(min(LARGEST, setup.steps), _ROW)
     accounts = np.zeros((_BOUNCES + len(rows), 2, len(AMOUNTS)))
     states, launch, end = start_of(scene, setup.model), math.nan, setup.steps if budget is None else budget
     done, bounces, goes_on = 0, 0, True
     while goes_on:
         states = np.concatenate([states[-1:], np.zeros(min(_AT_ONCE, end - done), STATE)])
-        schemes.advance(schemes.SCHEMES[scheme], MODELS[setup.model], law, physics, states, 1, h, schemes.TOLERANCE)
+        schemes.advance(schemes.SCHEMES[scheme], MODELS[setup.model], physics, states, 1, h, schemes.TOLERANCE)
         views = np.zeros(len(states), _VIEW)
-        _look(law, physics._replace(node_weight=0.0), states, lag * h, views)
+        _look(physics._replace(node_weight=0.0), states, lag * h, views)
         booked = _booked(physics, views[:-1], views[1:], lag, h)
         with np.errstate(all="ignore"):
             sound = np.abs(booked).sum(axis=1) < LARGEST_WORK
@@ -176,7 +175,7 @@ def _works(
 
 
 @njit(cache=True)
-def _look(law: Any, physics: Physics, states: States, late: float, views: npt.NDArray[np.void]) -> None:
+def _look(physics: Physics, states: States, late: float, views: npt.NDArray[np.void]) -> None:
     """View states whose velocity is `late` [s]; physics: without the nodes' weight, so that forces are the ground's."""
     for k in range(len(states)):
         state, view = states[k], views[k]
@@ -189,24 +188,24 @@ def _look(law: Any, physics: Physics, states: States, late: float, views: npt.ND
         view.elastic = energy.elastic(physics, state)
         view.lag = physics.mass * fall * (state.velocity[2] - 0.5 * fall)
         view.energy = view.kinetic + view.potential + view.elastic - view.lag
-        view.clearance = _feel(law, physics, state, view.forces)
+        view.clearance = _feel(physics, state, view.forces)
 
 
 @njit
-def _feel(law: Any, physics: Physics, state: Any, forces: Any) -> float:
+def _feel(physics: Physics, state: Any, forces: Any) -> float:
     """Add up each force of the ground over the nodes, as the models do, and return the clearance [m]."""
     clearance = height_of(physics, state) - physics.reach
-    if not reaches(law, clearance):
+    if not reaches(physics, clearance):
         return float(clearance)
     clearance = math.inf
     n = normal_of(physics)
     for k in range(len(state.node_offset)):
         arm, velocity = row(state.node_offset, k), node_velocity(state, k)
         depth = -upward(physics, plus(vector(state.position), arm))
-        force = node_force(law, physics, depth, velocity)
+        force = node_force(physics, depth, velocity)
         if depth > 0.0:
             spring, speed = physics.stiffness * depth, upward(physics, velocity)
-            push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
+            push = normal_force(physics, depth, speed)
             _pull(forces[_SPRING], arm, times(spring, n))
             _pull(forces[_DAMPING], arm, times(push - spring, n))
             _pull(forces[_FRICTION], arm, plus_times(force, -push, n))

@@ -44,7 +44,7 @@ def undisturbed(system: System, sight: Any) -> float:
 
     Under a law that drags on falling nodes that is as long as all rise, which is known only where none turns.
     """
-    if not (drags(system.law) and models.touches(system.model)):
+    if not (drags(system.physics) and models.touches(system.model)):
         return math.inf
     if models.turns(system.model) or sight.speed < 0.0:
         return 0.0
@@ -143,7 +143,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
 
     That is for at most `most` [s]; 0 where it changes now.
     """
-    law, physics = system.law, system.physics
+    physics = system.physics
     stiffness, damping = physics.stiffness, physics.damping
     c, u = sight.clearance, sight.speed
     square, rate, constant = 0.0, 0.0, -sight.pull
@@ -154,7 +154,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
                 square += 4 * stiffness / physics.mass
                 rate += 4 * damping / physics.mass
                 constant -= 4 * stiffness / physics.mass * (face * sight.room)
-        elif u < 0.0 and reaches(law, clearance):
+        elif u < 0.0 and reaches(physics, clearance):
             rate += 4 * damping / physics.mass
     lasts, changes = _bounds(square, rate, constant - square * c - rate * u, u, sight.step_size)
     lasts = min(lasts, most)
@@ -164,7 +164,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
         if clearance < 0.0:
             push = -stiffness * clearance - damping * u
             lasts = min(lasts, _until_zero(push, stiffness, damping, u, changes, sight.step_size))
-        elif damping > 0.0 and reaches(law, clearance):
+        elif damping > 0.0 and reaches(physics, clearance):
             lasts = min(lasts, _until_zero(u, 0.0, 1.0, u, changes, sight.step_size))
     return square, rate, constant, lasts
 
@@ -180,7 +180,7 @@ def resting_swing(system: System, sight: Any) -> float:
     """
     physics = system.physics
     h, omega = sight.step_size, math.sqrt(4 * physics.stiffness / physics.mass)
-    damped = h * (8.0 if drags(system.law) else 4.0) * physics.damping / physics.mass
+    damped = h * (8.0 if drags(system.physics) else 4.0) * physics.damping / physics.mass
     if omega * h > 0.5 or damped > 1.0 or not 0.0 < 2 * sight.sag < sight.room:
         return -1.0
     grows = math.exp(0.3 * sight.steps * damped * (omega * h) ** 2)
@@ -204,7 +204,7 @@ def _stays(system: System, sight: Any, rubs: bool) -> bool:
         return math.sqrt(square) + sight.steps * omega * ulp < resting_swing(system, sight)
     if rubs or sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0:
         return False
-    if not drags(system.law) or drag * h > physics.mass:
+    if not drags(system.physics) or drag * h > physics.mass:
         return False
     left = sight.steps * h - (sight.time - sight.late)
     return max(-sight.speed, weight / drag) * left + sight.steps * ulp < sight.clearance

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import along, matrices, turned
 from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of, start_of
@@ -67,7 +66,7 @@ class Scheme(Engine):
         return type(name, (cls,), {"SCHEME": name, "LAG": schemes.LAGS[name]})
 
     def __post_init__(self) -> None:
-        self._tags = schemes.SCHEMES[self.SCHEME], MODELS[self.model], LAWS[self.scene.ground.contact]
+        self._tags = schemes.SCHEMES[self.SCHEME], MODELS[self.model]
         self._physics, self._state = physics_of(self.scene), self.launch.copy()
 
     @classmethod
