@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
@@ -13,17 +13,11 @@ _NEEDED = ("title", "version", "date-released", "license", "authors")
 _NAMES = ("name", "given-names", "name-particle", "family-names", "name-suffix")
 
 
-class Author(NamedTuple):
-    """A person or, if there are no family names, an organisation; url: an ORCID or a web site, if there is one."""
-
-    name: str
-    is_person: bool
-    url: str | None
-    affiliation: str | None
-
-
 class Citation(NamedTuple):
-    """What a citation file says. url: of the project, if it has one; references: title and authors of each work."""
+    """What a citation file says. url: of the project, if it has one; references: title and authors of each work.
+
+    authors: the entries of persons and organisations (`name_of`).
+    """
 
     title: str
     version: str
@@ -32,7 +26,7 @@ class Citation(NamedTuple):
     url: str | None
     abstract: str
     keywords: tuple[str, ...]
-    authors: tuple[Author, ...]
+    authors: Sequence[Mapping[str, str]]
     references: tuple[tuple[str, str], ...]
 
     @classmethod
@@ -50,27 +44,20 @@ class Citation(NamedTuple):
             url=data.get("repository-code", data.get("url")),
             abstract=" ".join(str(data.get("abstract", "")).split()),
             keywords=tuple(data.get("keywords", ())),
-            authors=_authors(data),
-            references=tuple((work["title"], _named(_authors(work))) for work in data.get("references", ())),
+            authors=data["authors"],
+            references=tuple((work["title"], _names(work["authors"])) for work in data.get("references", ())),
         )
 
     @property
     def sentence(self) -> str:
         """How to cite it, in one line."""
-        return f"{_named(self.authors)} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
+        return f"{_names(self.authors)} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
 
 
-def _named(authors: Iterable[Author]) -> str:
-    return ", ".join(author.name for author in authors)
+def name_of(author: Mapping[str, str]) -> str:
+    """Return the whole name of a person or an organisation."""
+    return " ".join(author[key] for key in _NAMES if key in author)
 
 
-def _authors(work: Mapping[str, Any]) -> tuple[Author, ...]:
-    return tuple(
-        Author(
-            " ".join(entry[key] for key in _NAMES if key in entry),
-            "name" not in entry,
-            entry.get("orcid", entry.get("website")),
-            entry.get("affiliation"),
-        )
-        for entry in work["authors"]
-    )
+def _names(authors: Iterable[Mapping[str, str]]) -> str:
+    return ", ".join(map(name_of, authors))

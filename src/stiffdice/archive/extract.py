@@ -24,7 +24,6 @@ _ENCRYPTED = 1 << 0  # of a member's flags
 _HEADER = 30  # bytes of a member before its name
 _SMALL = 1_000_000  # bytes that a member may come to, whatever its ratio
 
-
 # What an archive may hold at most.
 MOST_BYTES = 20_000_000_000  # unpacked
 MOST_MEMBERS = 1_000_000
@@ -65,35 +64,32 @@ def unzip(path: str | Path, folder: str | Path, damaged: dict[str, str] | None =
 
 
 def _check(members: Sequence[ZipInfo]) -> None:
-    """Raise RefusedError naming the first member that must not be unpacked, and why."""
+    """Raise RefusedError naming the first member that must not be unpacked, and why.
+
+    Members that share bytes are one of the reasons (Fifield 2019, "A better zip bomb", USENIX WOOT). zipfile itself
+    refuses them from Python 3.11.8, 3.12.2 and 3.13 on, when the member is read.
+    """
     if len(members) > MOST_MEMBERS:
         raise RefusedError(f"{len(members)} members; allowed are {MOST_MEMBERS}")
     check_names([member.orig_filename for member in members])
-    for member in members:
-        if reason := _wrong(member):
+    end = 0
+    for member in sorted(members, key=lambda member: member.header_offset):
+        name, method, size, packed = member.filename, member.compress_type, member.file_size, member.compress_size
+        kind = stat.S_IFMT(member.external_attr >> 16)
+        reasons = {
+            "has a second name": name != member.orig_filename,  # some versions of zipfile take it instead
+            "is a link or a special file; allowed are files and folders": kind
+            not in {0, stat.S_IFDIR if name.endswith("/") else stat.S_IFREG},
+            "is encrypted": member.flag_bits & _ENCRYPTED,
+            f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
+            f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
+            "overlaps another member": member.header_offset < end,
+        }
+        if reason := next((reason for reason, holds in reasons.items() if holds), None):
             raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
+        end = member.header_offset + _HEADER + packed
     if sum(member.file_size for member in members) > MOST_BYTES:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
-    _check_overlaps(members)
-
-
-def _wrong(member: ZipInfo) -> str | None:
-    """Return why a member must not be unpacked."""
-    method, size, packed = member.compress_type, member.file_size, member.compress_size
-    kind = stat.S_IFMT(member.external_attr >> 16)
-    reasons = {
-        "has a second name": member.filename != member.orig_filename,  # some versions of zipfile take it instead
-        "is a link or a special file; allowed are files and folders": kind
-        not in {0, stat.S_IFDIR if _is_folder(member.filename) else stat.S_IFREG},
-        "is encrypted": member.flag_bits & _ENCRYPTED,
-        f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
-        f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
-    }
-    return next((reason for reason, holds in reasons.items() if holds), None)
-
-
-def _is_folder(name: str) -> bool:
-    return name.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
 
 
 def _wrong_name(name: str) -> str | None:
@@ -131,47 +127,28 @@ def check_names(names: Sequence[str]) -> None:
                 reason = "is there twice" if twice else f"a name that some systems take for {spelt[folded]}"
                 raise RefusedError(f"{path}: {reason}")
             spelt[folded] = path
-            if _is_folder(path):
+            if path.endswith("/"):
                 folders.add(path)
         if len(folders) > MOST_FOLDERS:
             raise RefusedError(f"more than {MOST_FOLDERS} folders; this is no archive of a study")
 
 
-def _check_overlaps(members: Sequence[ZipInfo]) -> None:
-    """Raise RefusedError if two members share bytes (Fifield 2019, "A better zip bomb", USENIX WOOT).
-
-    zipfile itself does so from Python 3.11.8, 3.12.2 and 3.13 on, when the member is read.
-    """
-    end = 0
-    for member in sorted(members, key=lambda member: member.header_offset):
-        if member.header_offset < end:
-            raise RefusedError(f"{member.filename}: overlaps another member")
-        end = member.header_offset + _HEADER + member.compress_size
-
-
 def _unpack_all(archive: ZipFile, folder: Path, damaged: dict[str, str] | None) -> None:
     for member in archive.infolist():
+        path = folder / member.filename
+        if member.filename.endswith("/"):
+            path.mkdir(parents=True, exist_ok=True)
+            continue
+        path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            _unpack(archive, member, folder / member.filename)
+            # Not through anything that is there; every folder above is one that we made.
+            with archive.open(member) as file, path.open("xb") as out:
+                shutil.copyfileobj(file, out, AT_ONCE)
+                if out.tell() != member.file_size:
+                    raise zipfile.BadZipFile(f"{out.tell()} bytes instead of {member.file_size}")
         except _DAMAGED as error:
+            path.unlink(missing_ok=True)
             reason = f"damaged: {error or 'cut short'}"
             if damaged is None:
                 raise RefusedError(f"{archive.filename}: {member.filename}: {reason}") from None
             damaged[member.filename] = reason
-
-
-def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
-    """Unpack one member; raises one of _DAMAGED, and leaves no file, if its content is damaged."""
-    if _is_folder(member.filename):
-        path.mkdir(parents=True, exist_ok=True)
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        # Not through anything that is there; every folder above is one that we made.
-        with archive.open(member) as file, path.open("xb") as out:
-            shutil.copyfileobj(file, out, AT_ONCE)
-            if out.tell() != member.file_size:
-                raise zipfile.BadZipFile(f"{out.tell()} bytes instead of {member.file_size}")
-    except _DAMAGED:
-        path.unlink(missing_ok=True)
-        raise

@@ -13,8 +13,7 @@ from stiffdice.dynamics.code_digest import PACKAGE
 
 SHOWN = 5  # of files that are other
 
-_WORKFLOW = ("Snakefile", "workflow/run.py")
-_TREES = ("src", "workflow")
+_CODE = ("Snakefile", "src", "workflow")
 _VERSION = re.compile(r'^__version__ = "([0-9A-Za-z.+-]{1,40})"', re.MULTILINE)
 
 
@@ -48,27 +47,22 @@ class Code(NamedTuple):
 
 def is_code(name: str) -> bool:
     """Return whether a run executes a file of an archive, or may."""
-    return name == "Snakefile" or name.startswith(tuple(f"{top}/" for top in _TREES))
+    return name.partition("/")[0] in _CODE
 
 
 def has_workflow() -> bool:
     """Return whether the package lies in a checkout of the project, which has the workflow, too."""
-    return all((PACKAGE.parents[1] / name).is_file() for name in _WORKFLOW)
+    return all((PACKAGE.parents[1] / name).is_file() for name in ("Snakefile", "workflow/run.py"))
 
 
 def compared(folder: Path, listed: Mapping[str, str]) -> Code:
     """Compare the code of an unpacked archive with the installed, file by file; listed: digests, by path."""
+    root, tops, above = PACKAGE.parent, (PACKAGE.name,), "src/"
+    if has_workflow():
+        root, tops, above = PACKAGE.parents[1], _CODE, ""
+    here = (file for top in tops for file in contents.tree(root, top, "code"))
+    ours = {f"{above}{file.path}": manifest.digest_of(file.source) for file in here}
     theirs = {name: digest for name, digest in listed.items() if is_code(name)}
-    ours = {name: manifest.digest_of(path) for name, path in _installed().items()}
     other = sorted(name for name in theirs.keys() | ours.keys() if theirs.get(name) != ours.get(name))
     said = _VERSION.search((folder / "src/stiffdice/__init__.py").read_text(encoding="utf-8", errors="replace"))
     return Code(said[1] if said else "unknown", len(theirs.keys() | ours.keys()), tuple(other))
-
-
-def _installed() -> dict[str, Path]:
-    """Return the installed files of code, by where an archive has them."""
-    root = PACKAGE.parents[1]
-    if not has_workflow():
-        return {f"src/{file.path}": file.source for file in contents.tree(PACKAGE.parent, PACKAGE.name, "code")}
-    files = (file for top in _TREES for file in contents.tree(root, top, "code"))
-    return {"Snakefile": root / "Snakefile"} | {file.path: file.source for file in files}

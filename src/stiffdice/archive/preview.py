@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from stiffdice.archive import manifest
-from stiffdice.archive.contents import REPORT
-from stiffdice.archive.sizes import in_megabytes
+from stiffdice.archive.contents import REPORT, in_megabytes
+from stiffdice.archive.crate import Facts
 from stiffdice.errors import printable
-
-if TYPE_CHECKING:
-    from stiffdice.archive.crate import Facts
 
 NAME = "ro-crate-preview.html"
 
@@ -20,7 +16,8 @@ def page(facts: Facts) -> str:
     """Return the page, as HTML: all text is shown as it is, in its order."""
     from jinja2 import Environment
 
-    environment = Environment(autoescape=True, finalize=_shown, trim_blocks=True, keep_trailing_newline=True)
+    environment = Environment(autoescape=True, trim_blocks=True, keep_trailing_newline=True)
+    environment.finalize = lambda value: printable(value) if isinstance(value, str) else value
     environment.filters["megabytes"] = in_megabytes
     template = environment.from_string(Path(__file__).with_name("preview.html.jinja").read_text(encoding="utf-8"))
     # Worth opening; shards, logs and code are in the manifest.
@@ -33,7 +30,3 @@ def page(facts: Facts) -> str:
     ]
     paths = ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME, *shown]
     return template.render(facts=facts, paths=paths, manifest=manifest.NAME)
-
-
-def _shown(value: object) -> object:
-    return printable(value) if isinstance(value, str) else value

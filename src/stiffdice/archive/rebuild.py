@@ -11,7 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -110,12 +110,28 @@ def opened(archive: str | Path, folder: str | Path | None = None) -> Iterator[Op
     Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be read; nothing is left then,
     but of a run that failed.
     """
-    with _place(folder) as place:
+    with ExitStack() as unless_done:
+        if folder is None:
+            temporary = tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True)
+            place = Path(unless_done.enter_context(temporary))
+        else:
+            place = Path(folder)
+            try:
+                place.mkdir(mode=0o700)
+            except OSError as error:
+                raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
+            unless_done.callback(shutil.rmtree, place, ignore_errors=True)
         unzip(archive, place / ARCHIVED)
-        listed = _checked(archive, place / ARCHIVED)
-        study = _study_of(archive, listed)
+        listed, study = _checked(archive, place / ARCHIVED)
         code = installed.compared(place / ARCHIVED, listed)
-        yield Opened(str(archive), place, folder is not None, study, listed, code)
+        try:
+            yield Opened(str(archive), place, folder is not None, study, listed, code)
+        except RunError:
+            if folder is not None:
+                unless_done.pop_all()
+            raise
+        if folder is not None:
+            unless_done.pop_all()
 
 
 def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
@@ -144,9 +160,15 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     """
     notes = other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
     _fill(unpacked)
-    said = _run(unpacked, way, cores)
-    notes += [line for line in said if "left out:" in line]
-    found = _compared(unpacked)
+    notes += [line for line in _run(unpacked, way, cores) if "left out:" in line]
+    archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
+    if made.resolve() != made:  # a link, to the archive's own perhaps
+        made = unpacked.folder / _NOTHING
+    made.mkdir(parents=True, exist_ok=True)
+    found = compare(archived, made)
+    # What is only in B was not asked for.
+    left_out = tuple(name for name in found.left_out if (archived / name).exists())
+    found = replace(found, only_b=(), left_out=left_out)
     if found.files == 0 and found.same:
         notes.append("there was nothing to compare")
     if not unpacked.code.is_installed:
@@ -156,48 +178,25 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     return Rebuilt(unpacked, found, notes)
 
 
-@contextmanager
-def _place(folder: str | Path | None) -> Iterator[Path]:
-    """Give a new folder; a temporary one is gone afterwards, another if anything but the run fails."""
-    if folder is None:
-        with tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True) as temporary:
-            yield Path(temporary)
-        return
-    place = Path(folder)
-    try:
-        place.mkdir(mode=0o700)
-    except OSError as error:
-        raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
-    try:
-        yield place
-    except RunError:
-        raise
-    except BaseException:
-        shutil.rmtree(place, ignore_errors=True)
-        raise
+def _checked(archive: str | Path, place: Path) -> tuple[dict[str, str], str]:
+    """Return manifest and study of an unpacked archive that passes every check and has all that runs it.
 
-
-def _checked(archive: str | Path, place: Path) -> dict[str, str]:
-    """Return the manifest of an unpacked archive that passes every check; raises RefusedError."""
+    Raises RefusedError for any other.
+    """
     if not (place / manifest.NAME).is_file():
         raise RefusedError(f"{archive}: has no {manifest.NAME}; not an archive of stiffdice")
-    report = verify(place)
-    if not report.ok:
-        first = report.problems[0]
-        raise RefusedError(f"{archive}: {first.file}: {first.reason}; not run. stiffdice verify names all that fails")
-    return manifest.parse((place / manifest.NAME).read_text(encoding="utf-8"))
-
-
-def _study_of(archive: str | Path, listed: Mapping[str, str]) -> str:
-    """Return the name of the study in an archive; raises RefusedError unless there is one, with all that runs it."""
+    for file, reason in verify(place).problems:
+        raise RefusedError(f"{archive}: {file}: {reason}; not run. stiffdice verify names all that fails")
+    listed = manifest.parse((place / manifest.NAME).read_text(encoding="utf-8"))
     names = {parts[1] for parts in (name.split("/") for name in listed) if parts[0] == "results" and len(parts) > 2}
     if len(names) != 1 or not studies.NAME.fullmatch(min(names)):
         told = ", ".join(sorted(names)) or "none"
         raise RefusedError(f"{archive}: holds results of these studies: {told}; allowed is one")
-    for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{min(names)}.yaml"):
+    (study,) = names
+    for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{study}.yaml"):
         if needed not in listed:
             raise RefusedError(f"{archive}: has no {needed}; it cannot be made again")
-    return min(names)
+    return listed, study
 
 
 def other_versions(lock: Path) -> list[str]:
@@ -215,10 +214,8 @@ def other_versions(lock: Path) -> list[str]:
 
 def _fill(unpacked: Opened) -> None:
     """Copy what runs: without the results, and beside the installed code only files that are read, not executed."""
-    for name in unpacked.listed:
+    for name in (name for name in unpacked.listed if not name.startswith(f"results/{unpacked.study}/")):
         is_read = name.endswith(_READ) and not name.startswith(".")
-        if name.startswith(f"results/{unpacked.study}/"):
-            continue
         if not unpacked.code.is_installed or installed.is_code(name) or is_read:
             target = unpacked.folder / REBUILT / name
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -229,33 +226,18 @@ def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
     """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
     command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
-    folder, log = unpacked.folder / REBUILT, unpacked.folder / LOG
+    log = unpacked.folder / LOG
     with log.open("wb") as out:
-        running = sandbox.start(way, command, folder, out)
+        running = sandbox.start(way, command, unpacked.folder / REBUILT, out)
         try:
             running.wait()
         finally:
             sandbox.end(running)
-    lines = _last_of(log).splitlines()
-    if running.returncode != 0:
-        where = f", in {unpacked.folder}" if unpacked.kept else ""
-        raise RunError(
-            f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:", lines[-LAST_LINES:]
-        )
-    return lines
-
-
-def _last_of(log: Path) -> str:
     with log.open("rb") as file:
         file.seek(max(0, log.stat().st_size - _LOG_READ))
-        return file.read().decode("utf-8", "replace")
-
-
-def _compared(unpacked: Opened) -> Comparison:
-    """Return how the archive's results (A) and those made again (B) differ; what is only in B was not asked for."""
-    archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
-    if made.resolve() != made:  # a link, to the archive's own perhaps
-        made = unpacked.folder / _NOTHING
-    made.mkdir(parents=True, exist_ok=True)
-    found = compare(archived, made)
-    return replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))
+        lines = file.read().decode("utf-8", "replace").splitlines()
+    if running.returncode != 0:
+        where = f", in {unpacked.folder}" if unpacked.kept else ""
+        told = f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:"
+        raise RunError(told, lines[-LAST_LINES:])
+    return lines

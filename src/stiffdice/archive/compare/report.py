@@ -7,8 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
-from stiffdice.archive.compare.datasets import Aspect, Difference
-from stiffdice.archive.compare.values import Values
+from stiffdice.archive.compare.differences import Aspect, Difference, Values
 from stiffdice.errors import printable
 
 # Of files, of attributes, and of variables of one file: so many are shown to people.
@@ -55,7 +54,11 @@ class Comparison:
 
     def lines(self) -> list[str]:
         """Return what differs as text: the verdict, what explains it, then file by file, as much as one can read."""
-        lines = [self.verdict, *self._about_attributes()]
+        found = Counter(aspect for part in self.differences for aspect in part.attributes)
+        # What made them explains the rest; what only one of the two says is often only newer.
+        ordered = sorted(found.items(), key=lambda item: (None in (item[0].a, item[0].b), -item[1]))
+        lines = [self.verdict]
+        lines += _first([f"{_against(one)} ({_count(count, 'file')})" for one, count in ordered], "attributes")
         for side, names in (("A", self.only_a), ("B", self.only_b)):
             lines += _first([f"only in {side}: {name}" for name in names], "files")
         for part in self.differences[:SHOWN]:
@@ -70,30 +73,18 @@ class Comparison:
     @property
     def verdict(self) -> str:
         """Whether A and B differ, in one line."""
-        if not self.same:
-            different = f"different: {', '.join(self._how_different())}"
-            return f"the numbers are the same; {different}" if self.numbers_same else different
         files = _count(self.files, "file")
-        if self.identical == self.files:
+        if self.same and self.identical == self.files:
             return f"the same, byte for byte: {files}"
-        return f"the same numbers and attributes, stored otherwise: {files}, {self.identical} of them byte for byte"
-
-    def _how_different(self) -> Iterator[str]:
-        """Yield what differs, the gravest first, and in how many files."""
+        if self.same:
+            return f"the same numbers and attributes, stored otherwise: {files}, {self.identical} of them byte for byte"
+        how = []
         for field, what in _KINDS.items():
-            number = sum(bool(getattr(part, field)) for part in self.differences)
-            if number:
-                yield f"{what} in {_count(number, 'file')}{_up_to(self.differences) if field == 'values' else ''}"
+            if number := sum(bool(getattr(part, field)) for part in self.differences):
+                how.append(f"{what} in {_count(number, 'file')}{_up_to(self.differences) if field == 'values' else ''}")
         for side, names in (("A", self.only_a), ("B", self.only_b)):
-            if names:
-                yield f"{_count(len(names), 'file')} only in {side}"
-
-    def _about_attributes(self) -> list[str]:
-        """Return which attributes differ, each once for all files that it does in: what made them explains the rest."""
-        found = Counter(aspect for part in self.differences for aspect in part.attributes)
-        # What only one of the two says is often only newer.
-        ordered = sorted(found.items(), key=lambda item: (None in (item[0].a, item[0].b), -item[1]))
-        return _first([f"{_against(one)} ({_count(count, 'file')})" for one, count in ordered], "attributes")
+            how += [f"{_count(len(names), 'file')} only in {side}"] if names else []
+        return f"{'the numbers are the same; ' if self.numbers_same else ''}different: {', '.join(how)}"
 
     def as_json(self) -> str:
         """Return all of it as JSON, with text for the numbers that JSON does not have."""
@@ -115,10 +106,8 @@ def _first(lines: Sequence[str], what: str) -> list[str]:
 
 def _up_to(parts: Sequence[Difference]) -> str:
     """Return the largest difference of floats in all files."""
-    values = [one for part in parts for one in part.values if one.ulp is not None]
-    if not values:
-        return ""
-    return f" (up to {_relative(*(max(getattr(one, name) for one in values) for name in ('ulp', 'relative')))})"
+    sizes = [(one.ulp, one.relative or 0.0) for part in parts for one in part.values if one.ulp is not None]
+    return f" (up to {_relative(*map(max, zip(*sizes, strict=True)))})" if sizes else ""
 
 
 def _relative(ulp: int, relative: float | None) -> str:

@@ -1,56 +1,108 @@
-"""One run: its counts, energies, rigid body, verdict and ledger, from its scene and its states."""
+"""Runs: counts, energies, rigid body and ledger of one, from its scene and its states; verdicts of one and of many."""
 
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.archive.consistency import energy as books
-from stiffdice.archive.consistency import verdicts
 from stiffdice.archive.consistency.tolerance import ROUNDING, outside, unequal
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import TURNING, physics_of, start_of
 from stiffdice.scene import scene as scenes
 from stiffdice.scene.scene import Scene
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.criteria.judge import ending, judge
 from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.simulation.outcome import SEVERITY, Verdict
+
+# Of one rotation of the nodes: the rounding of its axis, of sine and cosine, of the matrix, and of three products.
+_ROUNDINGS_OF_A_TURN = 32
+
+# How a run ended that ended early: its budget was spent, or what is graver.
+_EARLY = SEVERITY[SEVERITY.index(Verdict.UNDECIDED) :]
+# How a run may have ended that its measures do not show.
+_ENDINGS = (Verdict.UNRESOLVED, Verdict.SANK, Verdict.STALLED, Verdict.UNDECIDED)
+
+# How far a limit in a text of six digits may be from the number that it stands for, relative to it.
+_SIX_DIGITS = 5e-6
+
+_DEFECTS = ("spring_defect", "gravity_defect", "kick_defect")
+_WORKS = ("damping_work", "drag_work", "friction_work", *_DEFECTS)
 
 
 def problems(dataset: xr.Dataset) -> list[str]:
     """Return a line for everything in a run's file that cannot be so."""
     scene = scenes.from_mapping(json.loads(dataset.attrs["scene"]))
-    found = [*_attributes(dataset, scene), *_counts(dataset, scene)]
-    if found:  # what follows stands on them
+    if found := _counts(dataset, scene):  # what follows stands on them
         return found
-    found += [*_energies(dataset, scene), *_rigid(dataset, scene), *_judged(dataset)]
-    if "launch_energy" in dataset:
-        sizes = [np.abs(dataset[f"{name}_energy"].values) for name in ("kinetic", "potential", "elastic")]
-        steps = int(dataset.attrs["steps"])
-        found += books.problems(dataset, steps, scene.duration, float(np.sum(sizes, axis=0).max()))
-    return found
+    steps, done = int(dataset.attrs["steps"]), int(dataset["steps_done"])
+    whole = done == steps or int(dataset["verdict"]) in _EARLY
+    measures = {part.MEASURE: float(dataset.get(part.MEASURE, np.nan)) for part in CRITERIA.values()}
+    found = [
+        *_energies(dataset, scene),
+        *_rigid(dataset, scene),
+        *outside("steps_done", done, whole, "all steps, or a verdict that ends a run early"),
+        *_verdicts(dataset, measures),
+    ]
+    return found + (_ledger(dataset, steps, scene.duration) if "launch_energy" in dataset else [])
 
 
-def _attributes(dataset: xr.Dataset, scene: Scene) -> list[str]:
-    steps = int(dataset.attrs["steps"])
-    h, omega_h = scene.duration / steps, linear_theory.omega_h(scene, steps)
-    found = unequal("step_size", dataset.attrs["step_size"], h, 2 * ROUNDING * h, "duration / steps")
-    why = "√(4 S/m) times the step size"
-    return found + unequal("omega_h", dataset.attrs["omega_h"], omega_h, 8 * ROUNDING * omega_h, why)
+def of_shard(dataset: xr.Dataset) -> list[str]:
+    """Return a line for everything in a shard, or in some cells of one, that cannot be so."""
+    steps, done = dataset["steps"].values[:, None], dataset["steps_done"].values
+    cells = np.rec.fromarrays([dataset[name].values for name in ("contact", "stiffness", "steps")])
+    once = np.isin(np.arange(len(cells)), np.unique(cells, return_index=True)[1])
+    return [
+        *outside("steps", steps[:, 0], once, "a cell that is not there already"),
+        *outside("steps_done", done, (done >= 0) & (done <= steps), "a number from 0 to steps"),
+        *_verdicts(dataset, {part.MEASURE: dataset[part.MEASURE].values for part in CRITERIA.values()}),
+    ]
+
+
+def _verdicts(dataset: xr.Dataset, measures: Mapping[str, npt.ArrayLike]) -> list[str]:
+    """Verdicts and endings are what the measures, all of their shape, give.
+
+    Where it is not known which criteria were asked, a verdict is at least how its run ended. Raises ValueError if a
+    file's `criteria` says something else.
+    """
+    stored = dataset["verdict"].values
+    ended = dataset["ending"].values if "ending" in dataset else stored  # not in files of before it was stored
+    right = ending(measures, {name: ended == name for name in _ENDINGS})
+    found = outside("ending", ended, ended == right, "what the measures say, or graver") if "ending" in dataset else []
+    if "criteria" not in dataset.attrs:
+        bad = (right != Verdict.PASSED) & (right != Verdict.UNRESOLVED)  # graver than any criterion
+        return found + outside("verdict", stored, ~bad | (stored == right), "how the run ended")
+    least, most, text = {}, {}, str(dataset.attrs["criteria"])
+    for part in text.split("; "):
+        told = re.fullmatch(r"(\w+): (\w+) <= (\S+)", part)
+        if told is None or told[1] not in CRITERIA or told[2] != CRITERIA[told[1]].MEASURE:
+            raise ValueError(f"criteria = {text!r}: allowed are parts such as energy: energy_ratio <= 1.05")
+        limit, base = float(told[3]), CRITERIA[told[1]].BASE
+        least[told[1]], most[told[1]] = limit * (1 - _SIX_DIGITS) - base, limit * (1 + _SIX_DIGITS) - base
+    strict, lenient = judge(least, measures, right), judge(most, measures, right)
+    return found + outside("verdict", stored, (stored == strict) | (stored == lenient), "what its measures say")
 
 
 def _counts(dataset: xr.Dataset, scene: Scene) -> list[str]:
     """Every K-th step from the launch on, as far as the run went; the time of a step is step/steps of the duration."""
-    steps, done = int(dataset.attrs["steps"]), int(dataset["steps_done"])
-    found = outside("steps_done", done, 0 <= done <= steps, f"a number from 0 to {steps}")
-    step = dataset["step"].values
+    steps, done, step = int(dataset.attrs["steps"]), int(dataset["steps_done"]), dataset["step"].values
+    h, omega_h = scene.duration / steps, linear_theory.omega_h(scene, steps)
     every = max(1, int(step[1] - step[0])) if len(step) > 1 else 1
-    found += unequal("step", step, np.arange(len(step)) * every, 0.0, f"every {every}th step from the launch on")
+    right, why = step / steps * scene.duration, "√(4 S/m) times the step size"
+    found = [
+        *unequal("step_size", dataset.attrs["step_size"], h, 2 * ROUNDING * h, "duration / steps"),
+        *unequal("omega_h", dataset.attrs["omega_h"], omega_h, 8 * ROUNDING * omega_h, why),
+        *outside("steps_done", done, 0 <= done <= steps, f"a number from 0 to {steps}"),
+        *unequal("step", step, np.arange(len(step)) * every, 0.0, f"every {every}th step from the launch on"),
+    ]
     if len(step) > 1 and len(step) != done // every + 1:
         found.append(f"step: {len(step)} states; allowed are {done // every + 1}, as steps_done is")
-    right = step / steps * scene.duration
     return found + unequal("time", dataset["time"].values, right, 2 * ROUNDING * right, "step / steps * duration")
 
 
@@ -76,10 +128,6 @@ def _energies(dataset: xr.Dataset, scene: Scene) -> list[str]:
     ]
 
 
-# Of one rotation of the nodes: the rounding of its axis, of sine and cosine, of the matrix, and of three products.
-_ROUNDINGS_OF_A_TURN = 32
-
-
 def _rigid(dataset: xr.Dataset, scene: Scene) -> list[str]:
     """Distances between nodes are the cube's, but for the rounding of every turn since the launch.
 
@@ -99,13 +147,41 @@ def _rigid(dataset: xr.Dataset, scene: Scene) -> list[str]:
     ]
 
 
-# How a run ended that ended early: its budget was spent, or what is graver.
-_EARLY = SEVERITY[SEVERITY.index(Verdict.UNDECIDED) :]
+def _ledger(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
+    """What is booked adds up to what the energy changed by; bounces come one after another.
 
-
-def _judged(dataset: xr.Dataset) -> list[str]:
-    whole = int(dataset["steps_done"]) == int(dataset.attrs["steps"]) or int(dataset["verdict"]) in _EARLY
-    found = outside("steps_done", dataset["steps_done"].values, whole, "all steps, or a verdict that ends a run early")
-    names = [criterion.MEASURE for criterion in CRITERIA.values()]
-    measures = {name: float(dataset[name]) if name in dataset else np.nan for name in names}
-    return found + verdicts.problems(dataset, measures, verdicts.limits_in(str(dataset.attrs["criteria"])))
+    The last step of a bounce may be the first of the next.
+    """
+    rows, count = dataset.sizes["bounce"], int(dataset["bounce_count"])
+    first, last = dataset["bounce_first_step"].values, dataset["bounce_last_step"].values
+    found = [
+        *outside("bounce_count", count, rows == min(count, energy_budget.LARGEST), f"{rows}, the rows of the ledger"),
+        *outside("bounce_last_step", last, (last > first) & (last <= steps), f"after its first step, up to {steps}"),
+        *outside("bounce_first_step", first[1:], first[1:] >= last[:-1], "not before the bounce before has ended"),
+    ]
+    for name, step in (("bounce_start", first), ("bounce_end", last)):
+        right = step / steps * duration
+        found += unequal(name, dataset[name].values, right, 2 * ROUNDING * right, "step / steps * duration")
+    for prefix in ("", "flight_", "bounce_"):
+        parts = [dataset[prefix + name].values for name in _DEFECTS]
+        roundings = 2 * ROUNDING * sum(map(np.abs, parts))
+        work = f"{prefix}scheme_work"
+        found += unequal(work, dataset[work].values, sum(parts), roundings, "its three defects")
+    # Twelve roundings of the largest energy of its states in every step, which the compensated sums then keep.
+    highest = sum(np.abs(dataset[f"{name}_energy"].values) for name in ("kinetic", "potential", "elastic")).max()
+    step = 12 * ROUNDING * (highest + np.max(dataset["bounce_largest_elastic_energy"].values, initial=0.0))
+    for prefix, before, after, steps_of in (
+        ("", "launch_energy", "end_energy", np.asarray(steps)),
+        ("bounce_", "bounce_energy_before", "bounce_energy_after", last - first),
+    ):
+        booked = [dataset[prefix + name].values for name in _WORKS]
+        room = steps_of * (step + 2 * ROUNDING * sum(map(np.abs, booked)))
+        change = dataset[after].values - dataset[before].values
+        found += unequal(f"sum of {prefix}works", sum(booked), change, room, "the change of the energy")
+    # A run is its flights and its bounces; a compensated sum rounds once, but for the square of a rounding a step.
+    for name in energy_budget.AMOUNTS if count <= energy_budget.LARGEST else ():
+        amount, flights, bounces = (dataset[prefix + name].values for prefix in ("", "flight_", "bounce_"))
+        size = np.abs(amount) + np.abs(flights) + np.abs(bounces).sum()
+        room = (8 + rows + steps * steps * ROUNDING) * ROUNDING * size
+        found += unequal(name, amount, flights + bounces.sum(), room, "that of the flights and of all bounces")
+    return found

@@ -1,4 +1,4 @@
-"""Many runs: shards, the sweep that they add up to, and the edges found in it."""
+"""The sweep that shards add up to, and the edges found in it."""
 
 from __future__ import annotations
 
@@ -10,26 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.archive.consistency import verdicts
 from stiffdice.archive.consistency.tolerance import ROUNDING, outside, unequal
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.sweep import stability_limits
-
-
-def of_runs(dataset: xr.Dataset) -> list[str]:
-    """Return a line for everything in a shard, or in some cells of one, that cannot be so."""
-    steps, done = dataset["steps"].values[:, None], dataset["steps_done"].values
-    cells = np.rec.fromarrays([dataset[name].values for name in ("contact", "stiffness", "steps")])
-    once = np.isin(np.arange(len(cells)), np.unique(cells, return_index=True)[1])
-    # The limits of the criteria, where the runs were asked any.
-    limits = verdicts.limits_in(str(dataset.attrs["criteria"])) if "criteria" in dataset.attrs else None
-    measures = {criterion.MEASURE: dataset[criterion.MEASURE].values for criterion in CRITERIA.values()}
-    return [
-        *outside("steps", steps[:, 0], once, "a cell that is not there already"),
-        *outside("steps_done", done, (done >= 0) & (done <= steps), "a number from 0 to steps"),
-        *verdicts.problems(dataset, measures, limits),
-    ]
 
 
 def of_cells(dataset: xr.Dataset) -> list[str]:
@@ -60,16 +43,12 @@ def same_as_collected(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
     Of the runs no more is asked than of the sweep.
     """
     whole, runs = (json.loads(str(found.attrs.get("config", "{}"))) for found in (dataset, again))
-    config = _said_otherwise(whole, runs, runs, "config.", "its shards")
-    return (
-        _said_otherwise(dataset.attrs, again.attrs, _SHARED, "", "its shards")
-        + config
-        + _differences(dataset, again, {})
-    )
+    said = _said_otherwise(dataset.attrs, again.attrs, _SHARED, "its shards")
+    return said + _said_otherwise(whole, runs, runs, "its shards", "config.") + _differences(dataset, again, {})
 
 
 def _said_otherwise(
-    said: Mapping[str, Any], right: Mapping[str, Any], names: Iterable[str], above: str, whose: str
+    said: Mapping[str, Any], right: Mapping[str, Any], names: Iterable[str], whose: str, above: str = ""
 ) -> list[str]:
     return [
         f"{above}{name} = {said.get(name)}: allowed is {right.get(name)}, that of {whose}"
@@ -90,11 +69,11 @@ def same_as_found(dataset: xr.Dataset, collected: xr.Dataset) -> list[str]:
         rooms[name] = np.log(10) * _FIT_ROUNDING * np.abs(again[name].values)
     for name in ("limit", "pass_fraction_low", "pass_fraction_high"):
         rooms[name] = 16 * ROUNDING * np.abs(again[name].values) + 4 * ROUNDING
-    said = _said_otherwise(dataset.attrs, collected.attrs, (*_SHARED, "config_digest"), "", "its sweep")
+    said = _said_otherwise(dataset.attrs, collected.attrs, (*_SHARED, "config_digest"), "its sweep")
     return said + _differences(dataset, again, rooms)
 
 
-def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: Mapping[str, npt.ArrayLike]) -> list[str]:
+def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: Mapping[Any, npt.ArrayLike]) -> list[str]:
     found = []
     for name, right in again.variables.items():
         given = dataset.variables.get(name)
@@ -105,5 +84,5 @@ def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: Mapping[str, npt
         elif given.attrs.get("flag_meanings") != right.attrs.get("flag_meanings"):
             found.append(f"{name}: flag_meanings: allowed are {right.attrs.get('flag_meanings')}")
         else:
-            found += unequal(str(name), given.values, right.values, rooms.get(str(name), 0.0), "computed again")
+            found += unequal(str(name), given.values, right.values, rooms.get(name, 0.0), "computed again")
     return found
