@@ -16,7 +16,7 @@ from tests.archive import packing, roc
 
 from stiffdice import __version__
 from stiffdice.archive import crate
-from stiffdice.archive.citation import Citation
+from stiffdice.archive.crate import Citation
 from stiffdice.archive.pack import pack
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io.reader import open_file

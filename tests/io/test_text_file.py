@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from stiffdice.archive.compare.compare import unlisted
+from stiffdice.archive.compare import unlisted
 from stiffdice.archive.verify import verify
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
-from zipfile import ZipFile, ZipInfo
+from zipfile import ZipFile
 
 from stiffdice import __version__
 from stiffdice.archive import extract, manifest
@@ -87,11 +87,9 @@ def read(files: list[File]) -> tuple[dict[str, int], list[tuple[str, str]]]:
         dataset = open_file(file.source)
         if file.result.stage == "shard":
             runs[file.path] = dataset.sizes["cell"] * dataset.sizes["member"]
-        for key in ("libraries", "engine_versions", "simulator_version"):
-            for entry in str(dataset.attrs.get(key, "")).split("; "):
-                name, _, version = entry.partition(" ")
-                if version:
-                    software.add((name, version))
+        told = [dataset.attrs.get(key, "") for key in ("libraries", "engine_versions", "simulator_version")]
+        parts = (entry.partition(" ") for entry in "; ".join(map(str, told)).split("; "))
+        software |= {(name, version) for name, _, version in parts if version}
     return runs, sorted(software)
 
 
@@ -144,12 +142,6 @@ class Size(NamedTuple):
     bytes: int
     packed: int
 
-    @classmethod
-    def of(cls, members: Iterable[ZipInfo]) -> Size:
-        """Return the size of members of a zip file together."""
-        each = [(member.file_size, member.compress_size) for member in members]
-        return cls(len(each), sum(size for size, _ in each), sum(packed for _, packed in each))
-
 
 class Sizes(NamedTuple):
     """What an archive holds, without the three files that describe it.
@@ -165,10 +157,14 @@ class Sizes(NamedTuple):
     @classmethod
     def of(cls, archive: ZipFile, files: Sequence[File], runs: Mapping[str, int]) -> Sizes:
         """Return how much room files take in an archive that has them; runs: how many each shard holds."""
-        packed = {kind: [archive.getinfo(file.path) for file in files if file.kind == kind] for kind in KINDS}
-        packed["all"] = [archive.getinfo(file.path) for file in files]
-        kinds = {kind: Size.of(members) for kind, members in packed.items() if members}
-        return cls(kinds, sum(runs.values()), Size.of(map(archive.getinfo, runs)))
+        paths = {kind: [file.path for file in files if file.kind == kind] for kind in KINDS}
+        paths |= {"all": [file.path for file in files], "shards": list(runs)}
+        sizes = {}
+        for kind, names in paths.items():
+            each = [archive.getinfo(name) for name in names]
+            sizes[kind] = Size(len(each), sum(one.file_size for one in each), sum(one.compress_size for one in each))
+        shards = sizes.pop("shards")
+        return cls({kind: size for kind, size in sizes.items() if size.files}, sum(runs.values()), shards)
 
     @property
     def sentence(self) -> str:

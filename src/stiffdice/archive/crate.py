@@ -1,4 +1,4 @@
-"""What an archive says of itself to programs: an RO-Crate 1.1 that keeps to Workflow Run Crate 0.5.
+"""What an archive says of itself: to people a page, to programs an RO-Crate 1.1 that keeps to Workflow Run Crate 0.5.
 
 The specifications: https://w3id.org/ro/crate/1.1, https://w3id.org/ro/wfrun/workflow/0.5 (and with it
 https://w3id.org/ro/wfrun/process/0.5 and https://w3id.org/workflowhub/workflow-ro-crate/1.0).
@@ -11,19 +11,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from mimetypes import MimeTypes
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from stiffdice.archive import manifest
-from stiffdice.archive.citation import Citation, name_of
-from stiffdice.archive.contents import LOGS, REPORT, File, Sizes
-from stiffdice.errors import RefusedError
+from stiffdice.archive.contents import LOGS, REPORT, File, Sizes, in_megabytes
+from stiffdice.errors import InputError, RefusedError, printable
+from stiffdice.io import yaml_loader
 from stiffdice.study.config import Study
 from stiffdice.study.eta import took
 from stiffdice.study.outputs import Result
 
-NAME = "ro-crate-metadata.json"
+NAME, PREVIEW = "ro-crate-metadata.json", "ro-crate-preview.html"
 
 # What the crate conforms to: names and versions; and what its workflow does.
 _PROFILES = {
@@ -60,6 +60,62 @@ _HOMEPAGES = {
 }
 
 
+# Of CITATION.cff, what must be there; of its persons, what makes a whole name.
+_NEEDED = ("title", "version", "date-released", "license", "authors")
+_NAMES = ("name", "given-names", "name-particle", "family-names", "name-suffix")
+
+
+class Citation(NamedTuple):
+    """What CITATION.cff says (Citation File Format 1.2.0, https://doi.org/10.5281/zenodo.5171937).
+
+    url: of the project, if it has one. authors: entries of persons and organisations. references: title and authors of
+    each work.
+    """
+
+    title: str
+    version: str
+    released: str
+    licence: str
+    url: str | None
+    abstract: str
+    keywords: tuple[str, ...]
+    authors: Sequence[Mapping[str, str]]
+    references: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def load(cls, path: Path) -> Citation:
+        """Return what the file says; raises InputError naming the file and the key that is missing."""
+        data = yaml_loader.load(path)
+        for key in _NEEDED:
+            if not isinstance(data, dict) or key not in data:
+                raise InputError(f"{path}: {key} is missing")
+        return cls(
+            title=str(data["title"]),
+            version=str(data["version"]),
+            released=str(data["date-released"]),
+            licence=str(data["license"]),
+            url=data.get("repository-code", data.get("url")),
+            abstract=" ".join(str(data.get("abstract", "")).split()),
+            keywords=tuple(data.get("keywords", ())),
+            authors=data["authors"],
+            references=tuple((work["title"], _names(work["authors"])) for work in data.get("references", ())),
+        )
+
+    @property
+    def sentence(self) -> str:
+        """How to cite it, in one line."""
+        return f"{_names(self.authors)} ({self.released[:4]}): {self.title} Version {self.version}, {self.released}."
+
+
+def _name_of(author: Mapping[str, str]) -> str:
+    """Return the whole name of a person or an organisation."""
+    return " ".join(author[key] for key in _NAMES if key in author)
+
+
+def _names(authors: Iterable[Mapping[str, str]]) -> str:
+    return ", ".join(map(_name_of, authors))
+
+
 class Facts(NamedTuple):
     """What an archive says of itself is told from.
 
@@ -92,18 +148,15 @@ def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
     """
     begun, ended = [], []
     for file in files:
-        if file.kind != LOGS or file.source.suffix != ".tsv":
-            continue
-        end = file.source.stat().st_mtime
-        seconds = took(file.source)
-        if seconds is None:
-            raise RefusedError(f"{file.path}: not a benchmark of Snakemake; remove it")
-        begun.append(end - seconds)
-        ended.append(end)
+        if file.kind == LOGS and file.source.suffix == ".tsv":
+            seconds = took(file.source)
+            if seconds is None:
+                raise RefusedError(f"{file.path}: not a benchmark of Snakemake; remove it")
+            ended.append(file.source.stat().st_mtime)
+            begun.append(ended[-1] - seconds)
     if not ended or datetime.fromtimestamp(min(ended), UTC).year <= 1980:
         return None
-    first, last = (datetime.fromtimestamp(int(time), UTC) for time in (min(begun), max(ended)))
-    return first, last
+    return datetime.fromtimestamp(int(min(begun)), UTC), datetime.fromtimestamp(int(max(ended)), UTC)
 
 
 def describe(result: Result, study: Study) -> str:
@@ -126,6 +179,23 @@ def metadata(facts: Facts) -> str:
     return json.dumps({**graph, "@graph": entities}, indent=1, sort_keys=True) + "\n"
 
 
+def page(facts: Facts) -> str:
+    """Return the page, as HTML: all text is shown as it is, in its order."""
+    from jinja2 import Environment
+
+    environment = Environment(autoescape=True, trim_blocks=True, keep_trailing_newline=True)
+    environment.finalize = lambda value: printable(value) if isinstance(value, str) else value
+    environment.filters["megabytes"] = in_megabytes
+    template = environment.from_string(Path(__file__).with_name("preview.html.jinja").read_text(encoding="utf-8"))
+    # Worth opening; shards, logs and code are in the manifest.
+    paths = ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME]
+    for file in facts.files:
+        is_data = file.result is not None and file.result.stage not in {"shard", "figure", "animation"}
+        if is_data or file.kind == REPORT or file.path == "docs/FORMAT.md":
+            paths.append(file.path)
+    return template.render(facts=facts, paths=paths, manifest=manifest.NAME)
+
+
 class _Crate:
     """Fills a crate: each method adds entities, and returns those that others refer to."""
 
@@ -137,7 +207,7 @@ class _Crate:
         facts, root = self.facts, self.crate.root_dataset
         self.crate.metadata.extra_terms.update(_TERMS)
         told = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
-        self._add("ro-crate-preview.html", "CreativeWork", **told)
+        self._add(PREVIEW, "CreativeWork", **told)
         workflow = self._workflow()
         inputs = [self._file(path) for path in (f"config/{facts.study.name}.yaml", *facts.scenes)]
         outputs = self._results()
@@ -198,7 +268,7 @@ class _Crate:
             kind, where = "Organization" if "name" in author else "Person", author.get("affiliation")
             employer = self._add(f"#affiliation-{k}", "Organization", name=where) if where else None
             url = author.get("orcid", author.get("website"))
-            authors.append(self._add(url or f"#author-{k}", kind, name=name_of(author), url=url, affiliation=employer))
+            authors.append(self._add(url or f"#author-{k}", kind, name=_name_of(author), url=url, affiliation=employer))
         references = [
             self._add(f"#reference-{k}", "CreativeWork", name=title, description=f"By {names}")
             for k, (title, names) in enumerate(cited.references, 1)

@@ -64,11 +64,7 @@ def unzip(path: str | Path, folder: str | Path, damaged: dict[str, str] | None =
 
 
 def _check(members: Sequence[ZipInfo]) -> None:
-    """Raise RefusedError naming the first member that must not be unpacked, and why.
-
-    Members that share bytes are one of the reasons (Fifield 2019, "A better zip bomb", USENIX WOOT). zipfile itself
-    refuses them from Python 3.11.8, 3.12.2 and 3.13 on, when the member is read.
-    """
+    """Raise RefusedError naming the first member that must not be unpacked, and why."""
     if len(members) > MOST_MEMBERS:
         raise RefusedError(f"{len(members)} members; allowed are {MOST_MEMBERS}")
     check_names([member.orig_filename for member in members])
@@ -83,29 +79,18 @@ def _check(members: Sequence[ZipInfo]) -> None:
             "is encrypted": member.flag_bits & _ENCRYPTED,
             f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
             f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
+            # Fifield 2019, "A better zip bomb", USENIX WOOT; zipfile sees it from Python 3.11.8, 3.12.2 and 3.13 on.
             "overlaps another member": member.header_offset < end,
         }
-        if reason := next((reason for reason, holds in reasons.items() if holds), None):
-            raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
+        _refuse_first(member.orig_filename, reasons)
         end = member.header_offset + _HEADER + packed
     if sum(member.file_size for member in members) > MOST_BYTES:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
 
 
-def _wrong_name(name: str) -> str | None:
-    """Return why a name must not be in an archive: it leads elsewhere, here or on another system."""
-    parts = name.removesuffix("/").split("/")
-    reasons = {
-        "a name with a character that is not printed": not name.isprintable(),  # also NUL, and what turns text around
-        "an absolute path": name.startswith("/"),
-        "a name with a backslash or a colon, which some systems take for a path": "\\" in name or ":" in name,
-        "a path that climbs out": ".." in parts,
-        "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
-        "a path with an empty part": "" in parts,
-        "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
-        f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
-    }
-    return next((reason for reason, holds in reasons.items() if holds), None)
+def _refuse_first(name: str, reasons: dict[str, object]) -> None:
+    for reason in (reason for reason, holds in reasons.items() if holds):
+        raise RefusedError(f"{name[:200]}: {reason}")
 
 
 def check_names(names: Sequence[str]) -> None:
@@ -116,8 +101,18 @@ def check_names(names: Sequence[str]) -> None:
     spelt: dict[str, str] = {}  # each path of a file or folder, as a file system may know it and as it is said
     folders: set[str] = set()
     for name in names:
-        if reason := _wrong_name(name):
-            raise RefusedError(f"{name[:200]}: {reason}")
+        parts = name.removesuffix("/").split("/")
+        reasons = {
+            "a name with a character that is not printed": not name.isprintable(),  # also NUL, what turns text
+            "an absolute path": name.startswith("/"),
+            "a name with a backslash or a colon, which some systems take for a path": "\\" in name or ":" in name,
+            "a path that climbs out": ".." in parts,
+            "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
+            "a path with an empty part": "" in parts,
+            "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
+            f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
+        }
+        _refuse_first(name, reasons)
         for path in (name[: found.end()] for found in re.finditer("/|[^/]$", name)):
             if path in folders:
                 continue

@@ -8,8 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
-from stiffdice.archive import contents, crate, manifest, preview
-from stiffdice.archive.citation import Citation
+from stiffdice.archive import contents, crate, manifest
 from stiffdice.archive.contents import Sizes
 from stiffdice.archive.extract import AT_ONCE
 from stiffdice.errors import InputError
@@ -48,7 +47,7 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
             _add(archive, file, digests[file.path])
         facts = crate.Facts(
             study,
-            Citation.load(root / "CITATION.cff"),
+            crate.Citation.load(root / "CITATION.cff"),
             files,
             contents.scenes_of(study.name, root),
             {name: (archive.getinfo(name).file_size, digest) for name, digest in digests.items()},
@@ -58,7 +57,7 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
             agent,
         )
         # What describes the others comes last.
-        for name, text in ((preview.NAME, preview.page(facts)), (crate.NAME, crate.metadata(facts))):
+        for name, text in ((crate.PREVIEW, crate.page(facts)), (crate.NAME, crate.metadata(facts))):
             digests[name] = hashlib.sha256(text.encode()).hexdigest()
             archive.writestr(_info(name), text)
         archive.writestr(_info(manifest.NAME), manifest.text_of(digests))

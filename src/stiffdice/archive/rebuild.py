@@ -18,17 +18,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from stiffdice import __version__
-from stiffdice.archive import installed, manifest, sandbox
-from stiffdice.archive.compare.compare import Comparison, compare
+from stiffdice.archive import contents, manifest, sandbox
+from stiffdice.archive.compare import Comparison, compare
 from stiffdice.archive.extract import unzip
-from stiffdice.archive.installed import Code
 from stiffdice.archive.sandbox import Way
 from stiffdice.archive.verify import verify
+from stiffdice.dynamics.code_digest import PACKAGE
 from stiffdice.errors import OutputError, RefusedError, StiffdiceError, printable
 from stiffdice.io.text_file import LARGEST_TABLE, text_of
 from stiffdice.study import config as studies
 
 LAST_LINES = 20  # of a run that failed, to show
+SHOWN = 5  # of files that are other
 
 # In the folder of a rebuild: the archive, out of a sandbox's sight; what runs and what it makes; what the run says.
 ARCHIVED, REBUILT, LOG = "archived", "rebuilt", "rebuild.log"
@@ -36,6 +37,10 @@ _NOTHING = "nothing"  # an empty folder, for results that are not in their place
 
 # What the installed code is given of an archive: files that Python cannot import.
 _READ = (".yaml", ".yml", ".json")
+
+# What a run executes: of an archive, and of this installation.
+_CODE = ("Snakefile", "src", "workflow")
+_VERSION = re.compile(r'^__version__ = "([0-9A-Za-z.+-]{1,40})"', re.MULTILINE)
 
 _LOG_READ = 1 << 20  # bytes at the end of a log
 
@@ -49,6 +54,32 @@ class RunError(StiffdiceError):
 
     def __str__(self) -> str:
         return "\n  ".join([super().__str__(), *self._last])
+
+
+class Code(NamedTuple):
+    """What an archive's code is beside the installed.
+
+    version: of the archive's code, as it says itself. files: how many files of code the archive or this installation
+    has. other: those that are not in both, or not the same in both. As text, how it differs.
+    """
+
+    version: str
+    files: int
+    other: tuple[str, ...]
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether all that a run executes is installed here, to the last bit."""
+        return not self.other
+
+    def __str__(self) -> str:
+        names = ", ".join(self.other[:SHOWN])
+        more = f" and {len(self.other) - SHOWN} more" if len(self.other) > SHOWN else ""
+        has = "" if has_workflow() else "; a package has no Snakefile and no workflow/, a checkout has"
+        return (
+            f"its code says to be stiffdice {self.version}, installed is {__version__}{has}: "
+            f"{len(self.other)} of {self.files} files differ: {names}{more}"
+        )
 
 
 class Opened(NamedTuple):
@@ -123,7 +154,7 @@ def opened(archive: str | Path, folder: str | Path | None = None) -> Iterator[Op
             unless_done.callback(shutil.rmtree, place, ignore_errors=True)
         unzip(archive, place / ARCHIVED)
         listed, study = _checked(archive, place / ARCHIVED)
-        code = installed.compared(place / ARCHIVED, listed)
+        code = compared_code(place / ARCHIVED, listed)
         try:
             yield Opened(str(archive), place, folder is not None, study, listed, code)
         except RunError:
@@ -179,10 +210,7 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
 
 
 def _checked(archive: str | Path, place: Path) -> tuple[dict[str, str], str]:
-    """Return manifest and study of an unpacked archive that passes every check and has all that runs it.
-
-    Raises RefusedError for any other.
-    """
+    """Return manifest and study of an unpacked archive that passes every check; raises RefusedError for any other."""
     if not (place / manifest.NAME).is_file():
         raise RefusedError(f"{archive}: has no {manifest.NAME}; not an archive of stiffdice")
     for file, reason in verify(place).problems:
@@ -212,11 +240,34 @@ def other_versions(lock: Path) -> list[str]:
     return found
 
 
+def is_code(name: str) -> bool:
+    """Return whether a run executes a file of an archive, or may."""
+    return name.partition("/")[0] in _CODE
+
+
+def has_workflow() -> bool:
+    """Return whether the package lies in a checkout of the project, which has the workflow, too."""
+    return all((PACKAGE.parents[1] / name).is_file() for name in ("Snakefile", "workflow/run.py"))
+
+
+def compared_code(folder: Path, listed: Mapping[str, str]) -> Code:
+    """Compare the code of an unpacked archive with the installed, file by file; listed: digests, by path."""
+    root, tops, above = PACKAGE.parent, (PACKAGE.name,), "src/"
+    if has_workflow():
+        root, tops, above = PACKAGE.parents[1], _CODE, ""
+    here = (file for top in tops for file in contents.tree(root, top, "code"))
+    ours = {f"{above}{file.path}": manifest.digest_of(file.source) for file in here}
+    theirs = {name: digest for name, digest in listed.items() if is_code(name)}
+    other = sorted(name for name in theirs.keys() | ours.keys() if theirs.get(name) != ours.get(name))
+    said = _VERSION.search((folder / "src/stiffdice/__init__.py").read_text(encoding="utf-8", errors="replace"))
+    return Code(said[1] if said else "unknown", len(theirs.keys() | ours.keys()), tuple(other))
+
+
 def _fill(unpacked: Opened) -> None:
     """Copy what runs: without the results, and beside the installed code only files that are read, not executed."""
     for name in (name for name in unpacked.listed if not name.startswith(f"results/{unpacked.study}/")):
         is_read = name.endswith(_READ) and not name.startswith(".")
-        if not unpacked.code.is_installed or installed.is_code(name) or is_read:
+        if not unpacked.code.is_installed or is_code(name) or is_read:
             target = unpacked.folder / REBUILT / name
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(unpacked.folder / ARCHIVED / name, target)

@@ -17,9 +17,9 @@ import h5py
 import xarray as xr
 
 from stiffdice.archive import manifest
-from stiffdice.archive.compare.compare import LISTED, SHARDS, listed_in, shards_of
+from stiffdice.archive.compare import LISTED, SHARDS, listed_in, shards_of
 from stiffdice.archive.consistency import check as sanity
-from stiffdice.archive.consistency import sweeps
+from stiffdice.archive.consistency import equations
 from stiffdice.archive.crate import NAME as CRATE
 from stiffdice.archive.extract import unzip
 from stiffdice.errors import InputError, RefusedError, printable
@@ -141,14 +141,8 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
     if is_archive:
         report.checked["files"] += len(files)
         digests = {name: manifest.digest_of(path) for name, path in files.items()} | dict.fromkeys(damaged, "")
-        for name, check in ((manifest.NAME, _check_manifest), (CRATE, _check_crate)):
-            try:
-                if name in files:
-                    check(report, text_of(files[name], _LARGEST_TEXT), digests)
-                elif name not in damaged:
-                    report.fail(name, "missing; every archive has one")
-            except InputError as error:
-                report.fail(name, _reason(error, files[name]))
+        _check_digests(report, manifest.NAME, "listed", files, digests)
+        _check_digests(report, CRATE, "described", files, digests)
         _check_made(report, folder, files)
     else:
         report.note(f"digests (there is no {manifest.NAME})")
@@ -156,25 +150,30 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
     _Files(report, data, files).check_all()
 
 
-def _check_manifest(report: Report, text: str, digests: Mapping[str, str]) -> None:
-    """Check files both ways; digests: of what is there, empty where that is damaged."""
-    listed = manifest.parse(text)
-    report.checked["digests"] += len(listed)
-    _check_digests(report, listed, digests, f"listed in {manifest.NAME}")
-    for name in sorted(digests.keys() - listed.keys() - {manifest.NAME}):
-        report.fail(name, f"there, but not listed in {manifest.NAME}")
+def _check_digests(report: Report, name: str, how: str, files: Mapping[str, Path], digests: Mapping[str, str]) -> None:
+    """Check what a manifest or a description says of files; digests: of what is there, empty where it is damaged."""
+    if name not in files:
+        report.fail(name, *(["missing; every archive has one"] if name not in digests else []))
+        return
+    try:
+        text = text_of(files[name], _LARGEST_TEXT)
+        told: Mapping[str, str | None] = manifest.parse(text) if name == manifest.NAME else _described(report, text)
+    except InputError as error:
+        report.fail(name, _reason(error, files[name]))
+        return
+    report.checked["digests" if name == manifest.NAME else "described_files"] += len(told)
+    for file, digest in told.items():
+        if file not in digests:
+            report.fail(file, f"missing, but {how} in {name}")
+        elif digests[file] and digest not in (None, digests[file]):
+            report.fail(file, f"changed: its SHA-256 is {digests[file]}, but {digest} is {how} in {name}")
+    if name == manifest.NAME:
+        for file in sorted(digests.keys() - told.keys() - {name}):
+            report.fail(file, f"there, but not listed in {name}")
 
 
-def _check_digests(report: Report, told: Mapping[str, str], digests: Mapping[str, str], where: str) -> None:
-    for name, digest in told.items():
-        if name not in digests:
-            report.fail(name, f"missing, but {where}")
-        elif digests[name] not in ("", digest):
-            report.fail(name, f"changed: its SHA-256 is {digests[name]}, but {digest} is {where}")
-
-
-def _check_crate(report: Report, text: str, digests: Mapping[str, str]) -> None:
-    """Check that the crate's description can be read, and that what it says of files is so."""
+def _described(report: Report, text: str) -> dict[str, str | None]:
+    """Return the digest that a crate's description says of each file, None where it says none."""
     try:
         entities = {str(entity["@id"]): entity for entity in json.loads(text)["@graph"]}
         types = {name: entity.get("@type") for name, entity in entities.items()}
@@ -182,14 +181,11 @@ def _check_crate(report: Report, text: str, digests: Mapping[str, str]) -> None:
         raise RefusedError(f"not an RO-Crate's description ({type(error).__name__}: {error})") from None
     for needed in sorted({"./", CRATE} - entities.keys()):
         report.fail(CRATE, f"has no entity {needed}")
-    described = [
-        (unquote(name).removeprefix("./"), entities[name])
+    return {
+        unquote(name).removeprefix("./"): str(entities[name]["sha256"]) if "sha256" in entities[name] else None
         for name, kind in types.items()
         if "File" in (kind if isinstance(kind, list) else [kind]) and "://" not in name
-    ]
-    report.checked["described_files"] += len(described)
-    told = {name: str(entity.get("sha256", digests.get(name))) for name, entity in described}
-    _check_digests(report, told, digests, f"described in {CRATE}")
+    }
 
 
 def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> None:
@@ -255,7 +251,7 @@ class _Files:
         frontier = next(self._checked(edges), None) if edges in self._data else None
         if collected is not None and frontier is not None:
             try:
-                self._report.fail(edges, *sweeps.same_as_found(frontier, collected))
+                self._report.fail(edges, *equations.same_as_found(frontier, collected))
             except Exception as error:  # whatever hostile files make of it
                 self._report.fail(edges, f"cannot be computed again ({_reason(error)})")
         return {whole, edges, *names}
@@ -280,7 +276,7 @@ class _Files:
         try:
             criteria = meanings_of(collected["criterion"])
             again = collect(each, dict(zip(criteria, map(float, collected["tolerance"].values), strict=True)))
-            found = sweeps.same_as_collected(collected, again)
+            found = equations.same_as_collected(collected, again)
         except Exception as error:  # whatever hostile shards make of it
             deque(each, 0)  # those that it did not come to are checked, too
             found = [f"its shards do not add up to a sweep ({_reason(error)})"]

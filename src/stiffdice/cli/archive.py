@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from pathlib import Path
 
 from stiffdice import __version__
@@ -58,7 +59,6 @@ def _is_archive(path: Path) -> bool:
 
     from stiffdice.archive import crate
 
-    if not zipfile.is_zipfile(path):
-        return False
-    with zipfile.ZipFile(path) as archive:
+    with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
         return crate.NAME in archive.namelist()
+    return False

@@ -8,7 +8,7 @@ import pytest
 from tests import rounds
 
 from stiffdice.archive.consistency import check as sanity
-from stiffdice.archive.consistency import sweeps
+from stiffdice.archive.consistency import equations
 from stiffdice.archive.verify import verify
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.reader import open_file, parts
@@ -273,23 +273,23 @@ def test_a_cell_cannot_pass_with_more_members_than_fail_nothing(whole):
 
 
 def test_a_sweep_that_is_not_what_its_shards_add_up_to_is_seen(whole):
-    assert sweeps.same_as_collected(whole, whole) == []
+    assert equations.same_as_collected(whole, whole) == []
     count = int(whole.failing[0, 0])
-    found = sweeps.same_as_collected(changed(whole, "failing", (0, 0), lambda n: n - 1), whole)
+    found = equations.same_as_collected(changed(whole, "failing", (0, 0), lambda n: n - 1), whole)
     assert found == [
         f"failing[0, 0] = {count - 1}: allowed is {count}, computed again (1 of {whole.failing.size} values)"
     ]
-    assert sweeps.same_as_collected(whole.drop_vars("failing"), whole) == ["failing: is missing"]
-    assert "'cell': 3}: allowed is" in sweeps.same_as_collected(whole.isel(cell=slice(3)), whole)[0]
+    assert equations.same_as_collected(whole.drop_vars("failing"), whole) == ["failing: is missing"]
+    assert "'cell': 3}: allowed is" in equations.same_as_collected(whole.isel(cell=slice(3)), whole)[0]
 
 
 @pytest.mark.parametrize("name", ["first_pass", "last_fail", "flips", "pass_fraction", "exponent", "factor", "limit"])
 def test_a_frontier_that_does_not_follow_from_its_sweep_is_seen(whole, name):
     found = stability_limits.find(whole)
-    assert sweeps.same_as_found(found, whole) == []
+    assert equations.same_as_found(found, whole) == []
     place = tuple(np.argwhere(found[name].values > 0)[0])
-    assert sweeps.same_as_found(changed(found, name, place, slightly), whole)[0].startswith(name)
-    assert "model = vertical" in sweeps.same_as_found(found.assign_attrs(model="vertical"), whole)[0]
+    assert equations.same_as_found(changed(found, name, place, slightly), whole)[0].startswith(name)
+    assert "model = vertical" in equations.same_as_found(found.assign_attrs(model="vertical"), whole)[0]
 
 
 # The words of enums: a number in a file means what the registries say, whatever words the file has for it.

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from stiffdice.archive.consistency import runs, sweeps
+from stiffdice.archive.consistency import equations
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.errors import InputError
 from stiffdice.simulation import energy_budget
@@ -33,10 +33,11 @@ NOT_SEEN = {
 
 # By what a file must hold to be one; the first that fits.
 _KINDS = {
-    "run": ({"time", "position", "kinetic_energy"}, runs.problems),
-    "shard": ({"cell", "member", "verdict", "steps_done"}, runs.of_shard),
-    "sweep": ({"cell", "failing", "verdicts"}, sweeps.of_cells),
+    "run": ({"time", "position", "kinetic_energy"}, equations.of_run),
+    "shard": ({"cell", "member", "verdict", "steps_done"}, equations.of_shard),
+    "sweep": ({"cell", "failing", "verdicts"}, equations.of_cells),
     "frontier": ({"edge", "first_pass", "limit"}, lambda dataset: []),  # its sweep says all of it
+    "experiment": (set[str](), lambda dataset: []),
 }
 
 _VERDICTS = tuple(verdict.name.lower() for verdict in Verdict)
@@ -56,8 +57,8 @@ _COUNTED = ("criterion", "verdict", "axis", "edge")
 
 def kind_of(dataset: xr.Dataset) -> str:
     """Return `run`, `shard`, `sweep` or `frontier`; `experiment` for any other."""
-    there = set(map(str, [*dataset.variables, *dataset.sizes]))
-    return next((kind for kind, (names, _) in _KINDS.items() if names <= there), "experiment")
+    there = {*dataset.variables, *dataset.sizes}
+    return next(kind for kind, (names, _) in _KINDS.items() if names <= there)
 
 
 def problems(dataset: xr.Dataset) -> list[str]:
@@ -67,8 +68,6 @@ def problems(dataset: xr.Dataset) -> list[str]:
     sweeps: counts and verdicts.
     """
     kind = kind_of(dataset)
-    if kind == "experiment":
-        return []
     try:
         with np.errstate(all="ignore"):  # a run that blew up holds infinities
             return _KINDS[kind][1](dataset)

@@ -100,11 +100,13 @@ def holds_runs(dataset: xr.Dataset) -> bool:
     )
 
 
-def runs_difference(name: str, a: Sequence[xr.Dataset], b: Sequence[xr.Dataset]) -> Difference:
-    """Return how the runs in two sets of shards differ, matched by contact law, stiffness and steps of their cells.
+def data_difference(name: str, a: Sequence[xr.Dataset], b: Sequence[xr.Dataset]) -> Difference:
+    """Return how two sets of shards differ, cell by cell of one contact law, stiffness and steps; or how two files do.
 
     Raises ValueError, of xarray, where the shards of one side do not hold the same variables.
     """
+    if not all(map(holds_runs, [*a, *b])):
+        return datasets_difference(name, a[0], b[0])
     if not (a and b):
         return Difference(name, only_a=_labels(_joined(a)) if a else (), only_b=_labels(_joined(b)) if b else ())
     left, right = _joined(a), _joined(b)

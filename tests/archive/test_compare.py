@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import rounds
 
-from stiffdice.archive.compare.compare import compare
-from stiffdice.archive.compare.differences import datasets_difference, ulps, values_difference
+from stiffdice.archive.compare import compare
+from stiffdice.archive.differences import datasets_difference, ulps, values_difference
 from stiffdice.cli import main as cli
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation, seal

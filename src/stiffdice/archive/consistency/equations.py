@@ -1,25 +1,35 @@
-"""Runs: counts, energies, rigid body and ledger of one, from its scene and its states; verdicts of one and of many."""
+"""Equations that the numbers of a file must fulfil: of a run, of shards, of the sweep that they make up, of its edges.
+
+Of a run: counts, energies, rigid body, verdict and ledger, from its scene and its states.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.archive.consistency.tolerance import ROUNDING, outside, unequal
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import TURNING, physics_of, start_of
+from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.criteria.judge import ending, judge
 from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.simulation.outcome import SEVERITY, Verdict
+from stiffdice.sweep import stability_limits
+
+# Of one rounding, relative to its result: half of it, to be safe by two.
+ROUNDING = float(np.finfo(np.float64).eps)
+# Below it doubles have no full precision.
+TINY = float(np.finfo(np.float64).tiny)
 
 # Of one rotation of the nodes: the rounding of its axis, of sine and cosine, of the matrix, and of three products.
 _ROUNDINGS_OF_A_TURN = 32
@@ -35,8 +45,17 @@ _SIX_DIGITS = 5e-6
 _DEFECTS = ("spring_defect", "gravity_defect", "kick_defect")
 _WORKS = ("damping_work", "drag_work", "friction_work", *_DEFECTS)
 
+# Of the logarithms (base 10) through which a power law goes: a hundred terms of a size up to 20, twice rounded.
+_FIT_ROUNDING = 100 * 20 * 2 * ROUNDING
 
-def problems(dataset: xr.Dataset) -> list[str]:
+# What a file and the one that it is made from say alike.
+_SHARED = (
+    *("scene_digest", "model", "scheme", "simulator", "simulator_version", "code_digest", "early_stop"),
+    *("members", "runs_digest"),
+)
+
+
+def of_run(dataset: xr.Dataset) -> list[str]:
     """Return a line for everything in a run's file that cannot be so."""
     scene = scenes.from_mapping(json.loads(dataset.attrs["scene"]))
     if found := _counts(dataset, scene):  # what follows stands on them
@@ -148,10 +167,7 @@ def _rigid(dataset: xr.Dataset, scene: Scene) -> list[str]:
 
 
 def _ledger(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
-    """What is booked adds up to what the energy changed by; bounces come one after another.
-
-    The last step of a bounce may be the first of the next.
-    """
+    """What is booked adds up to what the energy changed by; the last step of a bounce may be the first of the next."""
     rows, count = dataset.sizes["bounce"], int(dataset["bounce_count"])
     first, last = dataset["bounce_first_step"].values, dataset["bounce_last_step"].values
     found = [
@@ -185,3 +201,92 @@ def _ledger(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
         room = (8 + rows + steps * steps * ROUNDING) * ROUNDING * size
         found += unequal(name, amount, flights + bounces.sum(), room, "that of the flights and of all bounces")
     return found
+
+
+def of_cells(dataset: xr.Dataset) -> list[str]:
+    """Return a line for every count in a collected sweep that cannot be so."""
+    members, failing, counts = int(dataset.attrs["members"]), dataset["failing"].values, dataset["verdicts"].values
+    passed = counts[:, meanings_of(dataset["verdict"]).index("passed")]
+    most = members - failing.max(axis=0)
+    return [
+        *outside("failing", failing, (failing >= 0) & (failing <= members), f"a number from 0 to {members}"),
+        *unequal("sum of verdicts", counts.sum(axis=1), members, 0.0, "the members of a cell"),
+        *outside("verdicts of passed", passed, passed <= most, "at most the members that fail no criterion"),
+    ]
+
+
+def same_as_collected(dataset: xr.Dataset, again: xr.Dataset) -> list[str]:
+    """Return a line for all that a sweep says otherwise than its shards, which it does to the last bit.
+
+    Of the runs no more is asked than of the sweep.
+    """
+    whole, runs = (json.loads(str(found.attrs.get("config", "{}"))) for found in (dataset, again))
+    said = _said_otherwise(dataset.attrs, again.attrs, _SHARED, "its shards")
+    return said + _said_otherwise(whole, runs, runs, "its shards", "config.") + _differences(dataset, again, {})
+
+
+def _said_otherwise(
+    said: Mapping[str, Any], right: Mapping[str, Any], names: Iterable[str], whose: str, above: str = ""
+) -> list[str]:
+    return [
+        f"{above}{name} = {said.get(name)}: allowed is {right.get(name)}, that of {whose}"
+        for name in names
+        if str(said.get(name)) != str(right.get(name))
+    ]
+
+
+def same_as_found(dataset: xr.Dataset, collected: xr.Dataset) -> list[str]:
+    """Return a line for every variable of a frontier that is not what its sweep says.
+
+    Counts and edges are equal; power laws to the rounding of their sums, as libraries add in other orders.
+    """
+    with np.errstate(all="ignore"):
+        again = stability_limits.find(collected)
+    rooms: dict[str, npt.ArrayLike] = dict.fromkeys(stability_limits.FIT, _FIT_ROUNDING)
+    for name in ("factor", "centre"):
+        rooms[name] = np.log(10) * _FIT_ROUNDING * np.abs(again[name].values)
+    for name in ("limit", "pass_fraction_low", "pass_fraction_high"):
+        rooms[name] = 16 * ROUNDING * np.abs(again[name].values) + 4 * ROUNDING
+    said = _said_otherwise(dataset.attrs, collected.attrs, (*_SHARED, "config_digest"), "its sweep")
+    return said + _differences(dataset, again, rooms)
+
+
+def _differences(dataset: xr.Dataset, again: xr.Dataset, rooms: Mapping[Any, npt.ArrayLike]) -> list[str]:
+    found = []
+    for name, right in again.variables.items():
+        given = dataset.variables.get(name)
+        if given is None:
+            found.append(f"{name}: is missing")
+        elif given.sizes != right.sizes or given.dims != right.dims:
+            found.append(f"{name}{dict(given.sizes)}: allowed is {dict(right.sizes)}")
+        elif given.attrs.get("flag_meanings") != right.attrs.get("flag_meanings"):
+            found.append(f"{name}: flag_meanings: allowed are {right.attrs.get('flag_meanings')}")
+        else:
+            found += unequal(str(name), given.values, right.values, rooms.get(name, 0.0), "computed again")
+    return found
+
+
+def unequal(name: str, found: npt.ArrayLike, right: npt.ArrayLike, room: npt.ArrayLike, why: str) -> list[str]:
+    """Return a line if values differ from what they must be by more than `room`, all of one shape.
+
+    Infinities and not-a-numbers are to be where the right values have them. why: the equation.
+    """
+    a, b = np.broadcast_arrays(np.asarray(found, np.float64), np.asarray(right, np.float64))
+    same = (a == b) | (np.isnan(a) & np.isnan(b)) | (np.abs(a - b) <= np.asarray(room) + TINY)
+    return outside(name, a, same, lambda k: f"{b[k]:.17g}, {why}")
+
+
+def outside(name: str, found: npt.ArrayLike, fine: npt.ArrayLike, allowed: str | Callable[[Any], str]) -> list[str]:
+    """Return a line on the first value that is not allowed, if one is not; fine: which are, of the same shape.
+
+    allowed: in words, or a function that says it at an index.
+    """
+    given, good = np.broadcast_arrays(found, fine)
+    if good.all():
+        return []
+    wrong = np.argwhere(~good)
+    k = tuple(wrong[0].tolist())
+    value = f"{given[k]:.17g}" if given.dtype.kind == "f" else str(given[k])
+    more = f" ({len(wrong)} of {given.size} values)" if given.size > 1 else ""
+    told = allowed if isinstance(allowed, str) else allowed(k)
+    return [f"{name}{list(k) if k else ''} = {value}: allowed is {told}{more}"]
