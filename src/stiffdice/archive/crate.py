@@ -108,7 +108,6 @@ class Citation(NamedTuple):
 
 
 def _name_of(author: Mapping[str, str]) -> str:
-    """Return the whole name of a person or an organisation."""
     return " ".join(author[key] for key in _NAMES if key in author)
 
 
@@ -206,8 +205,7 @@ class _Crate:
         """Add everything."""
         facts, root = self.facts, self.crate.root_dataset
         self.crate.metadata.extra_terms.update(_TERMS)
-        told = {"name": "What this is, for people", "encodingFormat": "text/html", "about": {"@id": "./"}}
-        self._add(PREVIEW, "CreativeWork", **told)
+        self._add(PREVIEW, "CreativeWork", name="What this is, for people", encodingFormat="text/html", about=root)
         workflow = self._workflow()
         inputs = [self._file(path) for path in (f"config/{facts.study.name}.yaml", *facts.scenes)]
         outputs = self._results()
@@ -232,8 +230,7 @@ class _Crate:
             endTime=ended,
             agent=self._add("#agent", "Person", name=facts.agent) if facts.agent else None,
         )
-        for key, value in self._described(run).items():
-            root[key] = value
+        root.update(self._described(run))
 
     def _add(self, identifier: str, kind: str, **properties: Any) -> Any:
         """Add an entity that is no file, and return it; properties without a value are left out."""

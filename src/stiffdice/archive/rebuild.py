@@ -198,8 +198,7 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     made.mkdir(parents=True, exist_ok=True)
     found = compare(archived, made)
     # What is only in B was not asked for.
-    left_out = tuple(name for name in found.left_out if (archived / name).exists())
-    found = replace(found, only_b=(), left_out=left_out)
+    found = replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))
     if found.files == 0 and found.same:
         notes.append("there was nothing to compare")
     if not unpacked.code.is_installed:

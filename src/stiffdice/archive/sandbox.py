@@ -26,7 +26,6 @@ _HOME, _TEMPORARY = ".home", ".home/tmp"  # in it
 # Of /etc, what programs read before they do anything: where libraries are, which of two is the default, fonts.
 _OF_ETC = ("ld.so.cache", "alternatives", "fonts", "octaverc", "octave.conf", "localtime")
 
-_NEEDED = ("snakemake", "numba", "h5py")
 _PATIENCE = 5.0  # seconds for what was killed to be gone
 
 
@@ -57,7 +56,7 @@ def sandboxed(folder: Path) -> Way:
     prefix += ["--proc", "/proc", "--dev", "/dev", "--bind", str(temporary), "/tmp", *_readable(folder)]
     prefix += ["--bind", str(folder.resolve()), str(_INSIDE), "--chdir", str(_INSIDE), "--"]
     way = Way(tuple(prefix), _INSIDE)
-    found = f"import sys; from importlib.util import find_spec; sys.exit(not all(map(find_spec, {_NEEDED})))"
+    found = "import sys, importlib.util as u; sys.exit(not all(map(u.find_spec, ('snakemake', 'numba', 'h5py'))))"
     tried = subprocess.run(
         [*prefix, sys.executable, "-c", found], env=environment(way), capture_output=True, text=True, check=False
     )
