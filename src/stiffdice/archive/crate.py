@@ -297,11 +297,10 @@ class _Crate:
         ours, software = self.facts.citation.url, []
         for name, release in self.facts.software:
             home = (ours if name == "stiffdice" else _HOMEPAGES.get(name)) or ""
-            told = {"name": name, "softwareVersion": release, "url": home}
-            if name == "stiffdice" and not home:
-                told["url"] = {"@id": "README.md"}
+            url = home or ({"@id": "README.md"} if name == "stiffdice" else None)
+            told = {"name": name, "softwareVersion": release, "url": url}
             software.append(self._add(f"{home}#{quote(f'{name}-{release}')}", "SoftwareApplication", **told))
-        told = {
+        about = self._said("Snakefile") | {
             "name": "stiffdice: how many time steps a stiff ground costs",
             "description": "From a study to runs, shards, sweeps, frontiers, figures and tables.",
             "version": self.facts.citation.version,
@@ -310,7 +309,6 @@ class _Crate:
             "conformsTo": self._add(_WORKFLOW_PROFILE, "CreativeWork", name="Bioschemas ComputationalWorkflow"),
             "softwareRequirements": software,
         }
-        about = self._said("Snakefile") | told
         return self.crate.add_workflow(
             dest_path="Snakefile", main=True, lang="snakemake", lang_version=number, properties=about
         )

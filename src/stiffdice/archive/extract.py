@@ -9,7 +9,7 @@ import struct
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
@@ -88,7 +88,7 @@ def _check(members: Sequence[ZipInfo]) -> None:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
 
 
-def _refuse_first(name: str, reasons: dict[str, object]) -> None:
+def _refuse_first(name: str, reasons: Mapping[str, object]) -> None:
     for reason in (reason for reason, holds in reasons.items() if holds):
         raise RefusedError(f"{name[:200]}: {reason}")
 

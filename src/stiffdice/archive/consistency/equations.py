@@ -184,8 +184,8 @@ def _ledger(dataset: xr.Dataset, steps: int, duration: float) -> list[str]:
         work = f"{prefix}scheme_work"
         found += unequal(work, dataset[work].values, sum(parts), roundings, "its three defects")
     # Twelve roundings of the largest energy of its states in every step, which the compensated sums then keep.
-    highest = sum(np.abs(dataset[f"{name}_energy"].values) for name in ("kinetic", "potential", "elastic")).max()
-    step = 12 * ROUNDING * (highest + np.max(dataset["bounce_largest_elastic_energy"].values, initial=0.0))
+    energy = np.sum([np.abs(dataset[f"{name}_energy"].values) for name in ("kinetic", "potential", "elastic")], axis=0)
+    step = 12 * ROUNDING * (energy.max() + np.max(dataset["bounce_largest_elastic_energy"].values, initial=0.0))
     for prefix, before, after, steps_of in (
         ("", "launch_energy", "end_energy", np.asarray(steps)),
         ("bounce_", "bounce_energy_before", "bounce_energy_after", last - first),
