@@ -5,8 +5,7 @@ import pytest
 from tests.report.figures.drawing import check_equal_files, drawn
 
 from stiffdice.experiments.work_precision import measure as work_precision
-from stiffdice.experiments.work_precision import time as work_precision_time
-from stiffdice.experiments.work_precision.effort import STEPPING
+from stiffdice.experiments.work_precision.measure import STEPPING
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import method_style, style
@@ -32,7 +31,7 @@ def data():
 def timings():
     options = {"methods": METHODS, "stiffness": [1e2, 1e4, 1e6], "per_decade": 1, "affordable": 1e-3, "rounds": 1}
     problems = {"flat timed": "flat-bounce", "rubbing timed": "sliding-bounce"}
-    return {name: work_precision_time.time(SCENE, problem=problem, **options) for name, problem in problems.items()}
+    return {name: work_precision.time(SCENE, problem=problem, **options) for name, problem in problems.items()}
 
 
 def lines_of(panel):

@@ -12,8 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.dynamics.state import Array
-from stiffdice.experiments.engines.contact import RATIOS
-from stiffdice.experiments.engines.single_bounce import OUTCOMES
+from stiffdice.experiments.engines import OUTCOMES, RATIOS
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered

@@ -11,7 +11,7 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
-from stiffdice.experiments.work_precision.effort import fixed_step
+from stiffdice.experiments.work_precision.measure import fixed_step
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered

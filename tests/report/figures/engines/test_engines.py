@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice.experiments.engines import limits as engine_limits
-from stiffdice.experiments.engines import speed as engine_speed
+from stiffdice.experiments import engines
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.report.figures import style
 from stiffdice.report.figures.engines import limits as limits_drawing
@@ -20,12 +19,12 @@ METHODS = ["symplectic_euler", "scipy", "numpy"]
 
 @pytest.fixture(scope="module")
 def limits():
-    return engine_limits.measure(SCENE, methods=METHODS, omega_h=[0.1, 12.0], count=4, phases=2)
+    return engines.limits(SCENE, methods=METHODS, omega_h=[0.1, 12.0], count=4, phases=2)
 
 
 @pytest.fixture(scope="module")
 def speed():
-    return engine_speed.time(SCENE, methods=METHODS, steps=120, rounds=1)
+    return engines.speed(SCENE, methods=METHODS, steps=120, rounds=1)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.experiments.engines.single_bounce import OUTCOMES
+from stiffdice.experiments.engines import OUTCOMES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 from stiffdice.report.methods import engines_note, name_of
