@@ -230,7 +230,8 @@ class _Crate:
             endTime=ended,
             agent=self._add("#agent", "Person", name=facts.agent) if facts.agent else None,
         )
-        root.update(self._described(run))
+        for key, value in self._described(run).items():
+            root[key] = value
 
     def _add(self, identifier: str, kind: str, **properties: Any) -> Any:
         """Add an entity that is no file, and return it; properties without a value are left out."""
