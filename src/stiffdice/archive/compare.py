@@ -268,9 +268,8 @@ def _first(parts: Sequence[Iterable[str]], what: str) -> list[str]:
 
 def _up_to(parts: Sequence[Difference]) -> str:
     """Return the largest difference of floats in all files."""
-    values = [one for part in parts for one in part.values if one.ulp is not None]
-    largest = (max((getattr(one, name) for one in values), default=None) for name in ("ulp", "relative"))
-    return f" (up to {_relative(*largest)})" if values else ""
+    sizes = [(one.ulp, one.relative or 0.0) for part in parts for one in part.values if one.ulp is not None]
+    return f" (up to {_relative(max(ulp for ulp, _ in sizes), max(size for _, size in sizes))})" if sizes else ""
 
 
 def _relative(ulp: int, relative: float | None) -> str:

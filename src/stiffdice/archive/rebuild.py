@@ -251,9 +251,7 @@ def has_workflow() -> bool:
 
 def compared_code(folder: Path, listed: Mapping[str, str]) -> Code:
     """Compare the code of an unpacked archive with the installed, file by file; listed: digests, by path."""
-    root, tops, above = PACKAGE.parent, (PACKAGE.name,), "src/"
-    if has_workflow():
-        root, tops, above = PACKAGE.parents[1], _CODE, ""
+    root, tops, above = (PACKAGE.parents[1], _CODE, "") if has_workflow() else (PACKAGE.parent, (PACKAGE.name,), "src/")
     here = (file for top in tops for file in contents.tree(root, top, "code"))
     ours = {f"{above}{file.path}": manifest.digest_of(file.source) for file in here}
     theirs = {name: digest for name, digest in listed.items() if is_code(name)}

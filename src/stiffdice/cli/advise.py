@@ -85,8 +85,8 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.io import seal
     from stiffdice.scene import scene as scenes
 
-    given = ((key, getattr(options, name), name in _VECTORS) for name, (key, _) in _KEYS.items())
-    changes = [f"{key}=[{text}]" if vector else f"{key}={text}" for key, text, vector in given if text is not None]
+    asked = ((key, getattr(options, name), name in _VECTORS) for name, (key, _) in _KEYS.items())
+    changes = [f"{key}=[{text}]" if vector else f"{key}={text}" for key, text, vector in asked if text is not None]
     changes += options.overrides
     file, preset = options.scene, options.preset
     scene = scenes.load(file, changes, preset) if file is not None else scenes.changed({}, changes, preset)
