@@ -14,8 +14,8 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.archive.consistency import equations
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.errors import InputError
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.simulation.dataset import AXES
@@ -42,8 +42,8 @@ _KINDS = {
 
 _VERDICTS = tuple(verdict.name.lower() for verdict in Verdict)
 _REGISTRIES: dict[str, Sequence[str]] = {
-    "contact": tuple(LAWS),
-    "cell_contact": tuple(LAWS),
+    "contact": tuple(CONTACT_LAWS),
+    "cell_contact": tuple(CONTACT_LAWS),
     "verdict": _VERDICTS,
     "ending": _VERDICTS,
     "criterion": tuple(CRITERIA),
