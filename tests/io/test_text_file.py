@@ -11,7 +11,7 @@ from stiffdice.archive.verify import verify
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.text_file import LARGEST_TABLE, beginning, rows_of, text_of
-from stiffdice.study import eta, job_log
+from stiffdice.study import job_log
 
 SHARD = "shards/0123456789ab.h5"
 
@@ -63,7 +63,7 @@ def test_every_reader_of_text_ends(strange):
     for read in (yaml_loader.load, lambda path: text_of(path, LARGEST_TABLE), lambda path: list(rows_of(path))):
         with pytest.raises(InputError, match=f"^{strange}: "):
             read(strange)
-    assert eta.took(strange) is None
+    assert job_log.took(strange) is None
     told = job_log.read(strange)
     assert told is None or not told.asked
     assert {*unlisted(strange.parent, [SHARD])} <= {SHARD}

@@ -13,7 +13,7 @@ from stiffdice.archive import extract, manifest
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.reader import open_file
-from stiffdice.study import outputs, provenance
+from stiffdice.study import outputs
 from stiffdice.study.config import Study
 
 # In the order of every list of sizes.
@@ -118,7 +118,7 @@ def _results(study: Study, root: Path) -> Iterator[File]:
             f"{missing[0]}: not there, as {len(missing)} of {len(planned)} files of this study; "
             f"make study STUDY={study.name} makes what is missing"
         )
-    stale = provenance.stale(provenance.of(study, root), root / top)
+    stale = outputs.stale(outputs.asked(study, root), root / top)
     if stale:
         first, reason = next(iter(stale.items()))
         raise InputError(

@@ -20,7 +20,7 @@ from stiffdice.archive.contents import LOGS, REPORT, File, Sizes, in_megabytes
 from stiffdice.errors import InputError, RefusedError, printable
 from stiffdice.io import yaml_loader
 from stiffdice.study.config import Study
-from stiffdice.study.eta import took
+from stiffdice.study.job_log import took
 from stiffdice.study.outputs import Result
 
 NAME, PREVIEW = "ro-crate-metadata.json", "ro-crate-preview.html"

@@ -28,7 +28,7 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.reader import open_file, parts
 from stiffdice.io.text_file import text_of
 from stiffdice.study import config as studies
-from stiffdice.study import job_log, output_digest, provenance
+from stiffdice.study import job_log, outputs
 from stiffdice.sweep.collect import collect
 
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
@@ -194,7 +194,7 @@ def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> Non
     try:
         if not _SCHEMA.is_file() or folder.resolve() != Path("results", name).resolve():
             raise InputError("this is not its project's folder")
-        stale = provenance.stale(provenance.of(studies.load(f"config/{name}.yaml", _SCHEMA)), folder)
+        stale = outputs.stale(outputs.asked(studies.load(f"config/{name}.yaml", _SCHEMA)), folder)
     except InputError as error:
         report.note(f"whether a study asks for these results ({error})")
         _check_made(report, folder, files)
@@ -211,8 +211,8 @@ def _check_made(report: Report, folder: Path, files: Mapping[str, Path]) -> None
             continue
         there = [file for file in told.made if log[1] + file in files]
         untold.difference_update(log[1] + file for file in there)
-        for file in output_digest.changed(told, folder / log[1], *there):
-            report.fail(log[1] + file, output_digest.reason(told, [file]))
+        for file in job_log.changed(told, folder / log[1], *there):
+            report.fail(log[1] + file, job_log.reason_of_change(told, [file]))
     if untold:
         report.note(f"whether {len(untold)} .h5 files are what their jobs made (no log says it)")
 
