@@ -25,7 +25,6 @@ FURTHER = {
     "integrators/symplectic_euler": ["integrators/test_registry.py"],
     "integrators/velocity_verlet": ["integrators/test_registry.py"],
     "integrators/registry": ["integrators/event_driven/test_dop853.py", "integrators/exact/test_scheme.py"],
-    "simulation/engines/quaternion": ["simulation/engines/test_stepper.py"],
     "sweep/grid": ["study/test_config.py", "simulation/test_reach.py", "sweep/test_partition.py"],
 }
 

@@ -93,6 +93,4 @@ def _exit_status(found: list[Status]) -> int:
     from stiffdice.study.status import State
 
     states = {status.state for status in found}
-    if State.FAILED in states:
-        return 1
-    return 0 if states == {State.DONE} else 3
+    return 1 if State.FAILED in states else 0 if states == {State.DONE} else 3

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
+from stiffdice.dynamics.state import Physics, States
 from stiffdice.errors import InputError
 from stiffdice.integrators import forward_euler, free_flight, implicit_euler, rk4, symplectic_euler, velocity_verlet
 from stiffdice.integrators.event_driven import scheme as event
@@ -112,6 +113,18 @@ swing = _chosen(lambda module: getattr(module, "swing", constant((math.nan, math
 
 # (scheme) -> whether the bounds of `fast_forward.py`, for how long a phase lasts and what stays at rest, hold for it.
 proven = _chosen(lambda module: constant(hasattr(module, "swing")))
+
+
+@njit(cache=True)
+def advance(scheme: Any, model: Any, physics: Physics, samples: States, every: int, h: float, tolerance: float) -> int:
+    """Step from samples[0] on and keep every K-th state in the others; return how often the force was evaluated."""
+    evaluations = 0
+    for k in range(1, samples.shape[0]):
+        samples[k] = samples[k - 1]
+        state = samples[k]
+        for _ in range(every):
+            evaluations += step(scheme, model, physics, state, h, tolerance)
+    return evaluations
 
 
 def budget_of(scheme: str, steps: int) -> int:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.scene import scene as scenes
 from stiffdice.simulation import backend
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.study import job_log
 from stiffdice.study.catalogue import DRAWINGS, EXPERIMENTS, TABLES, TIMINGS
 from stiffdice.study.config import PlannedFigure, Study
@@ -208,7 +208,7 @@ def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
             timed = result.stage == "timings"
             plans, entries = (study.timings, TIMINGS) if timed else (study.experiments, EXPERIMENTS)
             part = plans[name]
-            plan = [part.measure, part.options, stepper.attributes(part.options.get("methods", ()))]
+            plan = [part.measure, part.options, engines.attributes(part.options.get("methods", ()))]
             return scenes.load(root / part.scene, part.changes).digest, plan, entries[part.measure].module
         case "figure" | "animation":
             return "-", [study.figures[name], [study.dpi]], DRAWINGS[study.figures[name].draw].module

@@ -115,7 +115,7 @@ def shard_pattern(sweep: Sweep) -> xr.Dataset:
     values |= {name: np.arange(sizes[name], dtype=values[name].dtype) for name in ("member", "criterion")}
     title, code = "Runs of a sweep of stiffness and steps", ("stiffdice.sweep.shard", *backend.code_of(sweep.simulator))
     attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
-    attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
+    attributes |= {"simulator": sweep.simulator, "simulator_version": backend.version_of(sweep.simulator)}
     attributes |= dataset.config_attributes("shard", sweep.of_runs)
     note = "contact law and stiffness are the cell's, not the scene's"
     attributes |= {"seed": sweep.seed, "model_reason": sweep.model_reason, "scene_note": note}
