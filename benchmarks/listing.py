@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from benchmarks.case import Case, Effort
 from benchmarks.scenes import scene_of
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 SCHEME = "symplectic_euler"
 
@@ -56,7 +56,7 @@ def cases(effort: Effort) -> Iterator[Case]:
     """Yield the throw and its vertical part under both laws."""
     for (model, law), count in COUNTS.items():
         scene = scene_of(law, effort.steps)
-        run = stepper.ready(SCHEME, scene, model, effort.steps, 1)
+        run = engines.ready(SCHEME, scene, model, effort.steps, 1)
         yield Case(
             f"listing_{model}_{law}",
             f"{'throw' if model == 'tumbling' else model}, {law}: kernel in the listings' order",

@@ -11,11 +11,11 @@ from pathlib import Path
 
 from following import EVERY
 
-from stiffdice.study import eta, forecast, job_log
+from stiffdice.study import forecast, job_log
 from stiffdice.study.config import Study
-from stiffdice.study.eta import Job
+from stiffdice.study.forecast import Job
 from stiffdice.study.outputs import Result
-from stiffdice.study.status_report import duration
+from stiffdice.study.status import duration
 
 MEASURING = ("experiment", "timings")  # of which nothing tells better how long they take than how long they took
 OFTEN, SELDOM, LINES = 20.0, 300.0, 8  # s between two lines, at least and at most; about so many lines
@@ -34,16 +34,16 @@ class Duration:
             folder = Path("results", name)
             for result, seconds in forecast.seconds(study).items():
                 if (folder / result.benchmark).as_posix() in due:
-                    before = eta.took(folder / result.benchmark) if result.stage in MEASURING else None
+                    before = job_log.took(folder / result.benchmark) if result.stage in MEASURING else None
                     self._expected[folder, result] = before or seconds * slowness
         self._name = ", ".join(studies)
 
     def told(self) -> str:
         """Return a line on the whole of it, as it looks before it begins."""
-        alone, here = (eta.of(self._jobs(), self._cores, pace) for pace in (1.0, self._crowding))
-        crowd = f"; beside what else runs here now, {duration(here.seconds)}" if self._crowding > CROWDED else ""
+        alone, here = (forecast.left(self._jobs(), self._cores, pace) for pace in (1.0, self._crowding))
+        crowd = f"; beside what else runs here now, {duration(here)}" if self._crowding > CROWDED else ""
         jobs, cores = len(self._expected), f"{self._cores} core{'s' if self._cores > 1 else ''}"
-        return f"{self._name}: {jobs} job{'s' if jobs > 1 else ''}, about {duration(alone.seconds)} on {cores}{crowd}"
+        return f"{self._name}: {jobs} job{'s' if jobs > 1 else ''}, about {duration(alone)} on {cores}{crowd}"
 
     def left(self) -> tuple[str, float]:
         """Return a line on what is left, and how long that is [s].
@@ -51,7 +51,7 @@ class Duration:
         It goes by how long the jobs that have ended took, next to what was expected of them.
         """
         jobs = self._jobs()
-        seconds = eta.of(jobs, self._cores, self._crowding).seconds
+        seconds = forecast.left(jobs, self._cores, self._crowding)
         late = not seconds and any(job.due for job in jobs)
         rest = "what is left takes longer than foreseen" if late else f"about {duration(seconds)} left"
         done = sum(job.took is not None and not job.due for job in jobs)
@@ -79,9 +79,9 @@ class Duration:
         if told is None or told.begun is None or told.begun.timestamp() < self._begun - 1:  # told in whole seconds
             told = None
         if told is None or not told.ending:
-            return eta.job(result, weight, told, due=True, took=None)
+            return Job(result, weight, None, True, told)
         took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
-        return eta.job(result, weight, None, due=False, took=took)
+        return Job(result, weight, took, False)
 
 
 def _say(line: str) -> None:

@@ -21,13 +21,13 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
     root: the project. Where no job says that it failed, Snakemake's own log is all there is to name, if it began one.
     """
     from stiffdice.study import config as study
-    from stiffdice.study import status, status_report  # half a second
+    from stiffdice.study import status  # half a second
 
     os.chdir(root)  # scenes are named from here
     lines = []
     for name in sorted(name for name in studies if _at_work(name, begun)):
         try:
-            failed = status_report.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
+            failed = status.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
         except StiffdiceError as error:
             failed = f"  {error}"
         if failed:

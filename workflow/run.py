@@ -31,7 +31,6 @@ from job import ADDRESS  # noqa: E402
 
 from stiffdice.errors import printable  # noqa: E402
 from stiffdice.study import job_log  # noqa: E402
-from stiffdice.study.eta import took  # noqa: E402
 from stiffdice.study.process import end_with_parent  # noqa: E402
 
 # Of Snakemake, at most: what is made again because it was damaged may show that another result was.
@@ -71,7 +70,7 @@ def jobs_since(begun: float, studies: list[str]) -> dict[str, list[tuple[float, 
         relative = benchmark.relative_to(ROOT / "results")
         log = ROOT / "results" / relative.parts[0] / "logs" / Path(*relative.parts[2:]).with_suffix(".log")
         stage = relative.with_suffix("").parts[2]
-        seconds = took(benchmark)
+        seconds = job_log.took(benchmark)
         if seconds is not None:
             jobs.setdefault(stage, []).append((seconds, seconds_of_simulation(log)))
     return jobs

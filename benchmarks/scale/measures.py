@@ -12,7 +12,7 @@ from benchmarks.scale.project import Taken
 from stiffdice.io.reader import open_file
 from stiffdice.study import outputs
 from stiffdice.study.config import Study
-from stiffdice.study.eta import took
+from stiffdice.study.job_log import took
 
 # What jobs' logs tell.
 _SIMULATION, _CELLS = r"^simulation: ([0-9.]+) s$", r"^(\d+) cells, \d+ runs$"

@@ -16,9 +16,9 @@ from stiffdice.scene import scene as scenes
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
 from stiffdice.study import config as study
-from stiffdice.study import job_log, outputs, provenance
+from stiffdice.study import job_log, outputs
 from stiffdice.study.catalogue import TABLES
-from stiffdice.study.output_digest import digest_of
+from stiffdice.study.job_log import digest_of
 from stiffdice.sweep import partition, stability_limits
 from stiffdice.sweep.collect import collect
 from stiffdice.sweep.shard import compute_shard
@@ -78,7 +78,7 @@ def plan(folder: Path) -> study.Study:
 
 def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:
     """Make all results of the study in a project, with logs and benchmarks of jobs that ended then [s since 1970]."""
-    top, asks = folder / "results/tiny", provenance.of(planned, folder)
+    top, asks = folder / "results/tiny", outputs.asked(planned, folder)
     for result in outputs.of(planned):
         for name in (*result.files, result.log, result.benchmark):
             (top / name).parent.mkdir(parents=True, exist_ok=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from tests.archive import packing
 
-from stiffdice.archive import crate, manifest, preview
+from stiffdice.archive import crate, manifest
 from stiffdice.archive.pack import pack
 from stiffdice.cli.main import main
 from stiffdice.errors import InputError, OutputError, RefusedError
@@ -124,7 +124,7 @@ def test_it_holds_plain_files_and_folders_with_nothing_of_this_machine(finished,
             assert ".." not in info.filename.split("/")
         folders = [name for name in archive.namelist() if name.endswith("/")]
         files = [name for name in archive.namelist() if not name.endswith("/")]
-        assert archive.namelist() == [*sorted(folders), *sorted(files[:-3]), preview.NAME, crate.NAME, manifest.NAME]
+        assert archive.namelist() == [*sorted(folders), *sorted(files[:-3]), crate.PREVIEW, crate.NAME, manifest.NAME]
     for data in contents(packed.path).values():
         assert str(finished[0]).encode() not in data
         assert str(packing.ROOT).encode() not in data

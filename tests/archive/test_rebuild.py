@@ -19,11 +19,13 @@ import yaml
 from tests.archive import sandboxes
 
 from stiffdice import __version__
-from stiffdice.archive import manifest
+from stiffdice.archive import contents, manifest
+from stiffdice.archive import rebuild as rebuilding
 from stiffdice.archive.rebuild import ARCHIVED, REBUILT, RunError, opened, other_versions, rebuild, way_of
 from stiffdice.archive.sandbox import unconfined
 from stiffdice.archive.verify import CRATE
 from stiffdice.cli.main import main
+from stiffdice.dynamics.code_digest import PACKAGE
 from stiffdice.errors import RefusedError
 from stiffdice.io.reader import open_file
 from stiffdice.io.writer import write_dataset
@@ -369,3 +371,53 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
     assert f"made again by the installed code, stiffdice {__version__}: 3 files are the same to the last bit" in out
     assert "1 differ; 0 hold or show times and are not compared\nDIFFERS, between" in out
     assert "the numbers are the same; different: attributes in 1 file\ntitle: forged against " in out
+
+
+# Whether an archive's code is the installed code, file by file.
+
+
+@pytest.fixture(scope="module")
+def listed():
+    """The digests that a manifest of this project's code has, and of a scene."""
+    files = [file for top in ("src", "workflow") for file in contents.tree(ROOT, top, "code")]
+    named = {file.path: file.source for file in files} | {name: ROOT / name for name in ("Snakefile", "Makefile")}
+    return {name: manifest.digest_of(path) for name, path in named.items()} | {"config/scenes/mine.yaml": "0" * 64}
+
+
+def test_this_projects_code_is_the_installed_code(listed):
+    code = rebuilding.compared_code(ROOT, listed)
+    assert code.is_installed and code.version == __version__ and code.files == len(listed) - 2
+
+
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [
+        ("src/stiffdice/dynamics/contact.py", "0" * 64),
+        ("src/stiffdice/io/more.py", "0" * 64),
+        ("src/numpy/__init__.py", "0" * 64),
+        ("workflow/run.py", "0" * 64),
+        ("workflow/profiles/default/config.yaml", None),
+        ("Snakefile", "0" * 64),
+    ],
+)
+def test_one_file_makes_it_other_code(listed, name, digest):
+    """Changed, added or missing."""
+    changed = {key: value for key, value in {**listed, name: digest}.items() if value}
+    code = rebuilding.compared_code(ROOT, changed)
+    assert not code.is_installed and code.other == (name,)
+    assert f"installed is {__version__}: 1 of {code.files} files differ: {name}" in str(code)
+
+
+def test_some_of_many_are_named(listed):
+    code = rebuilding.compared_code(ROOT, dict.fromkeys(listed, "0" * 64))
+    assert str(code).endswith(f" and {len(code.other) - rebuilding.SHOWN} more")
+
+
+def test_a_package_that_is_no_checkout_has_no_workflow_to_run(listed, tmp_path, monkeypatch):
+    """As a wheel installs it: its library is compared, and the difference says what is missing."""
+    package = tmp_path / "site-packages" / PACKAGE.name
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(rebuilding, "PACKAGE", package)
+    code = rebuilding.compared_code(ROOT, listed)
+    assert {Path(name).parts[0] for name in code.other} == {"Snakefile", "workflow"}
+    assert "a package has no Snakefile and no workflow/, a checkout has" in str(code)

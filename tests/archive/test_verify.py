@@ -21,7 +21,7 @@ from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
 from stiffdice.study import job_log
-from stiffdice.study.output_digest import digest_of
+from stiffdice.study.job_log import digest_of
 from stiffdice.sweep import stability_limits
 from stiffdice.sweep.collect import collect
 

@@ -25,7 +25,7 @@ from benchmarks.store import PART, dataset_of, last_in, path_for
 from stiffdice.cli.main import main
 from stiffdice.errors import NotInstalledError, StiffdiceError
 from stiffdice.io.reader import open_file
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines.registry import ready
 
 ROOT = Path(__file__).parents[2]
 
@@ -321,7 +321,7 @@ def test_the_throw_in_octave_is_the_throw():
     steps, h = 400, 5e-3
     scene = scene_of("ungated", round(steps * h / 1e-4))
     place = octave.Throw(scene, steps).go()
-    states = stepper.ready("symplectic_euler", scene, "tumbling", steps, 1)()().states
+    states = ready("symplectic_euler", scene, "tumbling", steps, 1)()().states
     launch = states[0]["position"] + scene.duration * np.array([5, 0, 5 - 9.8 * scene.duration / 2])
     assert abs(place[2] - launch[2]) > 1  # it landed
     np.testing.assert_allclose(place, states[-1]["position"], rtol=1e-9)

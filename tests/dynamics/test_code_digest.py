@@ -34,7 +34,7 @@ def digest_of(copy, module):
 SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.shard", "stiffdice.simulation.dataset"}
 DRAWING = {"stiffdice.report.figures.cube"}
 COMPARING = {"stiffdice.experiments.work_precision.measure"}
-DRIVING = {"stiffdice.simulation.engines.driver"}
+DRIVING = {"stiffdice.simulation.engines.registry"}
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ DRIVING = {"stiffdice.simulation.engines.driver"}
         ("io/shard_writer.py", {"stiffdice.sweep.shard"}),
         ("simulation/engines/scipy_ivp.py", COMPARING | DRIVING),
         ("simulation/engines/octave.m", COMPARING | DRIVING),
-        ("simulation/engines/driver.py", DRIVING),
+        ("simulation/engines/registry.py", COMPARING | DRIVING),
         ("report/figures/style.py", DRAWING),
         ("report/figures/cube.py", DRAWING),
         ("report/figures/stability/stability_limits.py", set()),

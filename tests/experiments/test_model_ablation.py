@@ -13,7 +13,7 @@ from stiffdice.experiments import model_ablation
 from stiffdice.experiments.model_ablation import pieces_of, take_with_tensor
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene.scene import Scene, from_mapping
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 pytestmark = pytest.mark.long
 
@@ -93,7 +93,7 @@ def test_each_scene_needs_all_but_its_piece(contact):
 def test_a_tensor_that_turns_with_a_cube_changes_nothing():
     scene = from_mapping({"launch": {"angular_momentum": [0.3, 0.5, -0.2]}, "duration": 1.8})
     model, steps = MODELS["tumbling"], 3000
-    plain = stepper.ready("symplectic_euler", scene, "tumbling", steps, 1)()().states[1:]
+    plain = engines.ready("symplectic_euler", scene, "tumbling", steps, 1)()().states[1:]
     turning, tensor = start_of(scene, "tumbling"), scene.cube.moment_of_inertia * np.eye(3)
     take_with_tensor(model, physics_of(scene), turning, tensor, scene.duration / steps, steps)
     for part in ("position", "velocity", "angular_momentum", "angular_velocity", "node_offset"):

@@ -165,9 +165,9 @@ def by_spool(k, path):
 
 def by_shard(k, path):
     plan = Sweep(
-        scene.load("config/scenes/figure-13.yaml"), "sliding", "symplectic_euler", ("gated",),
-        {"from": 1e2, "to": 1e3, "count": 2}, None, {"from": 3.0, "to": 1.0, "count": 4}, 2, k, 0, {"energy": 0.1},
-        True, 1.0,
+        scene=scene.load("config/scenes/figure-13.yaml"), model="sliding", scheme="symplectic_euler",
+        contact=("gated",), stiffness={"from": 1e2, "to": 1e3, "count": 2},
+        omega_h={"from": 3.0, "to": 1.0, "count": 4}, members=2, seed=k, criteria={"energy": 0.1}, horizon=1.0,
     )
     compute_shard(plan, [Piece(column, tuple(plan.scan(column))) for column in plan.columns()], path)
 

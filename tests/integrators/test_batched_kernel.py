@@ -5,9 +5,8 @@ import pytest
 
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Ensemble, physics_of
-from stiffdice.integrators.registry import SCHEMES
+from stiffdice.integrators.registry import SCHEMES, advance
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation import fixed_step
 from stiffdice.simulation.initial_conditions import turned
 from stiffdice.simulation.run import simulate
 
@@ -27,7 +26,7 @@ def listed(scene, model, launches, steps, samples=1):
     states[:, 0] = launches
     tags = SCHEMES["symplectic_euler"], MODELS[model]
     for member in states:
-        fixed_step.advance(*tags, physics_of(scene), member, steps // samples, scene.duration / steps, 1e-9)
+        advance(*tags, physics_of(scene), member, steps // samples, scene.duration / steps, 1e-9)
     return states
 
 

@@ -6,12 +6,14 @@ import os
 
 import pytest
 
-from stiffdice.archive.compare import folders
+from stiffdice.archive.compare import unlisted
 from stiffdice.archive.verify import verify
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.io.text_file import LARGEST_TABLE, beginning, rows_of, text_of
-from stiffdice.study import eta, job_log
+from stiffdice.study import job_log
+
+SHARD = "shards/0123456789ab.h5"
 
 
 def huge(path):
@@ -61,12 +63,10 @@ def test_every_reader_of_text_ends(strange):
     for read in (yaml_loader.load, lambda path: text_of(path, LARGEST_TABLE), lambda path: list(rows_of(path))):
         with pytest.raises(InputError, match=f"^{strange}: "):
             read(strange)
-    assert eta.took(strange) is None
+    assert job_log.took(strange) is None
     told = job_log.read(strange)
     assert told is None or not told.asked
-    (strange.parent / "shards").mkdir()
-    (strange.parent / "shards" / "0123456789ab.h5").touch()
-    assert folders.read("A", strange.parent).unlisted <= {"shards/0123456789ab.h5"}
+    assert {*unlisted(strange.parent, [SHARD])} <= {SHARD}
 
 
 def test_verify_refuses_a_list_that_is_too_long(tmp_path):
@@ -79,12 +79,10 @@ def test_verify_refuses_a_list_that_is_too_long(tmp_path):
 
 
 def test_a_table_without_its_column_leaves_out_nothing(tmp_path):
-    (tmp_path / "shards").mkdir()
-    (tmp_path / "shards" / "0123456789ab.h5").touch()
     (tmp_path / "shards.csv").write_text("nonsense\n1\n")
-    assert not folders.read("A", tmp_path).unlisted
+    assert not [*unlisted(tmp_path, [SHARD])]
     (tmp_path / "shards.csv").write_text("shard\nba9876543210\n")
-    assert folders.read("A", tmp_path).unlisted == {"shards/0123456789ab.h5"}
+    assert [*unlisted(tmp_path, [SHARD])] == [SHARD]
 
 
 def test_a_table_with_a_field_that_is_too_long_is_none(tmp_path):

@@ -18,7 +18,6 @@ FURTHER = {
     "dynamics/models/free_flight": ["integrators/test_registry.py"],
     "dynamics/vector": ["dynamics/models/test_tumbling.py"],
     "integrators/exact/oscillator": ["integrators/exact/test_scheme.py"],
-    "integrators/exact/regularised_friction": ["integrators/exact/test_scheme.py"],
     "integrators/forward_euler": ["integrators/test_registry.py"],
     "integrators/free_flight": ["integrators/test_registry.py"],
     "integrators/member_block": ["integrators/test_batched_kernel.py"],
@@ -26,7 +25,6 @@ FURTHER = {
     "integrators/symplectic_euler": ["integrators/test_registry.py"],
     "integrators/velocity_verlet": ["integrators/test_registry.py"],
     "integrators/registry": ["integrators/event_driven/test_dop853.py", "integrators/exact/test_scheme.py"],
-    "simulation/engines/quaternion": ["simulation/engines/test_stepper.py"],
     "sweep/grid": ["study/test_config.py", "simulation/test_reach.py", "sweep/test_partition.py"],
 }
 

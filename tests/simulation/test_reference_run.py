@@ -6,7 +6,7 @@ import pytest
 from stiffdice.dynamics.state import start_of
 from stiffdice.errors import InputError
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.reference import SAMPLES
+from stiffdice.simulation.criteria.trajectory import SAMPLES
 from stiffdice.simulation.reference_run import references
 
 HALF = 1.0352761804100830 / 2  # of the side

@@ -20,7 +20,7 @@ from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import PRESETS
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.criteria.registry import CRITERIA
-from stiffdice.simulation.engines.registry import ENGINES, PEERS, adapter_of
+from stiffdice.simulation.engines.registry import ENGINES, METHODS, adapter_of
 from stiffdice.study import catalogue
 from stiffdice.study import config as study
 from stiffdice.sweep import partition as shards
@@ -557,7 +557,7 @@ def without():
 
         def remove(*engines):
             for engine in engines:
-                patch.setitem(PEERS, engine, PEERS[engine]._replace(load=failing))
+                patch.setitem(METHODS, engine, METHODS[engine]._replace(load=failing))
             adapter_of.cache_clear()
 
         yield remove

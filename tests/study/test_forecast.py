@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from stiffdice.simulation import batch_loop
-from stiffdice.study import catalogue, forecast, outputs
+from stiffdice.study import catalogue, forecast, job_log, outputs
 from stiffdice.study import config as studies
+from stiffdice.study.forecast import Job
+from stiffdice.study.outputs import Result
 from stiffdice.sweep import partition
 
 
@@ -74,3 +77,40 @@ def test_a_hundredth_of_a_second_tells_how_fast_this_machine_is():
 def test_jobs_beside_others_take_longer():
     assert forecast.crowding(2) >= 1
     assert forecast.crowding(10_000) < 1.1
+
+
+def done(stage, weight, took):
+    return Job(Result(stage, "one", ()), weight, took, due=False)
+
+
+def due(stage, weight=1.0, took=None, log=None):
+    return Job(Result(stage, "one", ()), weight, took, due=True, log=log)
+
+
+@pytest.mark.parametrize(
+    ("jobs", "cores", "left"),
+    [
+        ([], 1, 0),
+        ([done("shard", 2, 10)], 1, 0),
+        ([due("shard")], 1, 2),  # nothing has ended: as foretold
+        ([due("shard", took=7)], 1, 7),  # as long as it took before
+        ([done("shard", 2, 10), due("shard", 3)], 1, 15),  # as its kind, by weight
+        ([done("shard", 1, 1), done("shard", 1, 3), done("shard", 1, 50), due("shard")], 1, 3),  # the median
+        ([done("figure", 2, 10), due("shard", 3)], 1, 15),  # as all others, where none of its kind has ended
+        ([done("figure", 2, 10), done("shard", 1, 1), due("shard", 3)], 1, 3),
+        ([due("shard", took=10) for _ in range(4)], 2, 20),
+        ([due("shard", took=30), due("shard", took=2)], 8, 30),  # the longest, if there are cores enough
+        ([due("shard", took=10), due("timings", took=5), due("timings", took=5)], 2, 20),
+    ],
+)
+def test_time_left(jobs, cores, left):
+    assert forecast.left(jobs, cores, pace=2.0) == left
+
+
+@pytest.mark.parametrize(("progress", "took", "left"), [(0.4, 10, 20), (0.0, 100, 70), (0.0, 10, 0)])
+def test_a_running_job_takes_as_long_as_its_progress_says(tmp_path, progress, took, left):
+    """Else as it took before; it has run for 30 s, and said after 20 s how far it was."""
+    (tmp_path / "log").write_text(f"{job_log.begun()}\n")
+    log, now = job_log.read(tmp_path / "log"), datetime.now(UTC)
+    log = log._replace(begun=now - timedelta(seconds=30), written=now - timedelta(seconds=10), progress=progress)
+    assert forecast.left([due("shard", took=took, log=log)], 1, pace=2.0) == pytest.approx(left, abs=1)

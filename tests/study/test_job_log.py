@@ -19,11 +19,10 @@ def read(path, *lines):
 
 
 def test_what_is_written_is_read_back(tmp_path):
-    told = read(tmp_path / "log", job_log.begun(), job_log.tenth(0.314), job_log.tenth(0.7), job_log.cells(12, 8))
+    told = read(tmp_path / "log", job_log.begun(), job_log.tenth(0.314), job_log.tenth(0.7), job_log.cells(12, 96))
     assert (told.process, told.host, told.progress, told.cells) == (os.getpid(), host.name(), 0.7, 12)
     assert abs(told.begun - datetime.now(UTC)) < timedelta(seconds=5)
     assert (told.ending, told.reason) == ("", "")
-    assert job_log.is_here(told)
     assert job_log.is_alive(told)
 
 
@@ -59,9 +58,14 @@ def test_a_process_that_has_ended_is_not_alive(tmp_path):
     assert not job_log.is_alive(told)
 
 
+def test_of_a_process_on_another_host_nothing_is_known(tmp_path):
+    told = read(tmp_path / "log", f"begun 2026-01-01T00:00:00Z by process {os.getpid()} on elsewhere")
+    assert job_log.is_alive(told) is None
+
+
 def test_another_process_with_its_number_is_another_process(tmp_path):
     told = read(tmp_path / "log", f"begun 2001-01-01T00:00:00Z by process {os.getpid()} on {host.name()}")
-    assert not job_log.is_alive(told)
+    assert job_log.is_alive(told) is False
 
 
 @pytest.mark.parametrize(

@@ -73,23 +73,10 @@ sweeps = st.fixed_dictionaries(base | {"steps": spans(1, 1e6, 30)}, optional=mor
 def planned(asked):
     """Return the sweep that a study's keys ask for."""
     span = asked["stiffness"]
-    return Sweep(
-        Scene(),
-        asked["model"],
-        asked.get("scheme", "symplectic_euler"),
-        tuple(asked["contact"]),
-        span if isinstance(span, dict) else {"from": span, "to": span, "count": 1},
-        asked.get("steps"),
-        asked.get("omega_h"),
-        asked["members"],
-        asked.get("seed", 0),
-        asked.get("refine", 0),
-        {"energy": 0.05},
-        asked.get("early_stop", True),
-        Scene().duration,
-        asked.get("seconds_per_job"),
-        reach=asked.get("reach"),
-    )
+    defaults = {"scheme": "symplectic_euler", "criteria": {"energy": 0.05}, "horizon": Scene().duration}
+    ours = {"scene": Scene(), "contact": tuple(asked["contact"])}
+    spans = span if isinstance(span, dict) else {"from": span, "to": span, "count": 1}
+    return Sweep(**(defaults | asked | ours | {"stiffness": spans}))
 
 
 @read_each

@@ -19,8 +19,8 @@ from stiffdice.cli import status as command
 from stiffdice.errors import InputError
 from stiffdice.io import seal
 from stiffdice.study import config as studies
-from stiffdice.study import forecast, job_log, outputs, provenance, status, status_report
-from stiffdice.study.output_digest import digest_of
+from stiffdice.study import forecast, job_log, outputs, status
+from stiffdice.study.job_log import digest_of
 from stiffdice.study.status import State
 from stiffdice.sweep import partition
 
@@ -39,7 +39,7 @@ class Made:
     """A folder of results, made up."""
 
     def __init__(self, study, folder):
-        self.study, self.folder, self.asked = study, folder, provenance.of(study, ROOT)
+        self.study, self.folder, self.asked = study, folder, outputs.asked(study, ROOT)
         for result in outputs.of(study):
             self.make(result)
 
@@ -50,7 +50,7 @@ class Made:
         for file in result.files:
             content = b"x" * (1000 - seal.LENGTH)
             self._path(file).write_bytes(content + seal.line_of(content))
-        cells = [job_log.cells(200, 8)] if result.stage == "shard" else []
+        cells = [job_log.cells(200, 1600)] if result.stage == "shard" else []
         self.log(result, job_log.begun(), *self.words(result), *cells, job_log.done(seconds))
         self._path(result.benchmark).write_text(f"s\th:m:s\tmax_rss\n{seconds}\t0:00:10\t99.5\n")
 
@@ -104,8 +104,8 @@ def test_nothing_is_there_at_first(study, tmp_path):
     first = sum(len(sweep.scan(column)) for column in sweep.columns())
     assert {standing.state for standing in found.standings} == {found.state} == {State.WAITING}
     assert found.cells["steps-needed"] == (first, 0, 0, 0, 0, True)
-    assert 10 < found.left.seconds < 300  # foretold
-    assert found.left.cores == 1
+    assert 10 < found.left < 300  # foretold
+    assert found.cores == 1
     assert found.use.total == 0
     assert {standing.result.stage for standing in found.ready} == {"trajectory", "shard"}
 
@@ -115,8 +115,8 @@ def test_all_is_done_at_last(made):
     assert found.state is State.DONE
     count = len(plan_of(made))
     assert found.cells["steps-needed"] == (200 * count, 200 * count, 0, 0, 1600 * count, False)
-    assert found.left == (0, 1)
-    assert status_report.failures(found) == ""
+    assert (found.left, found.cores) == (0, 1)
+    assert status.failures(found) == ""
     assert (found.use.kinds["shards"], found.use.stale) == (1000 * count, {})
 
 
@@ -214,7 +214,7 @@ def test_what_stands_on_a_failure_is_not_done(made):
     assert found.ready == []
     done = 200 * (len(partition.rounds(plan_of(made), 0)) - 1)
     assert found.cells["steps-needed"][1:5] == (done, 0, found.cells["steps-needed"].planned - done, 8 * done)
-    told = status_report.failures(found)
+    told = status.failures(found)
     assert f"shard {shard.name}  no room\n    log: results/quick/{shard.log}\n" in told
     assert "not made because of that: survey steps-needed/0, shard steps-needed/" in told
     assert ", collect steps-needed, frontier steps-needed, figure frontier" in told
@@ -234,8 +234,8 @@ def test_what_was_asked_otherwise_is_stale_until_it_is_made_again(made, lines, r
     assert (made.standing(frontier).state, made.standing(frontier).reason) == (State.STALE, reason)
     assert [standing.result.name for standing in found.those(State.WAITING)] == ["frontier"]  # the figure of it
     assert found.state is State.STALE
-    assert f"\n  frontier steps-needed  {reason}\n" in status_report.as_text(found)
-    assert status_report.as_data(found)["results"]["stale"] == 1
+    assert f"\n  frontier steps-needed  {reason}\n" in status.as_text(found)
+    assert status.as_data(found)["results"]["stale"] == 1
     assert command._exit_status([found]) == 3
     made.make(frontier)
     assert made.look().state is State.DONE
@@ -256,7 +256,7 @@ def test_what_its_job_did_not_make_is_stale(made):
 
 def test_what_nobody_says_why_is_told(made):
     made.unmake(made.named("figure"))
-    assert status_report.failures(made.look()) == "  not made, and no log says why: figure position"
+    assert status.failures(made.look()) == "  not made, and no log says why: figure position"
 
 
 def test_needs_are_as_the_workflow_has_them(study):
@@ -281,7 +281,7 @@ def test_needs_are_as_the_workflow_has_them(study):
 def test_every_study_of_the_project_can_be_told(name, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
     found = status.of(studies.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml"), tmp_path)
-    for told in (status_report.as_text(found), status_report.as_line(found), json.dumps(status_report.as_data(found))):
+    for told in (status.as_text(found), status.as_line(found), json.dumps(status.as_data(found))):
         assert told.startswith(name) or f'"study": "{name}"' in told
 
 
@@ -304,13 +304,13 @@ def test_running_shards_count_by_their_tenths(made):
 def test_the_time_left_is_that_of_like_jobs(made):
     made.unmake(made.named("shard"))
     made.unmake(made.named("trajectory"))
-    found = made.look(cores=1).left
+    found = made.look(cores=1)
     # A shard and all of the next round, survey, collect, frontier and the figure; a trajectory and its figure.
     weights = forecast.seconds(made.study)
     shards = [made.named("shard", number) for number in range(len(plan_of(made)))]
     rate = statistics.median(10 / weights[shard] for shard in shards[1:])
     later = sum(shard.round > 0 for shard in plan_of(made).values())
-    assert found.seconds == pytest.approx(weights[shards[0]] * rate + 10 + 10 * (later + 5), rel=0.2)
+    assert found.left == pytest.approx(weights[shards[0]] * rate + 10 + 10 * (later + 5), rel=0.2)
 
 
 def plan_of(made):
@@ -321,10 +321,13 @@ def test_while_a_run_is_under_way_what_it_cannot_make_takes_no_time(made):
     shard, run = made.named("shard"), made.named("trajectory")
     made.unmake(shard, benchmark=False)
     made.log(shard, job_log.begun(), job_log.failed(InputError("no room")))
-    assert made.look(cores=1).left.seconds == pytest.approx(60)
+    assert made.look(cores=1).left == pytest.approx(60)
     made.unmake(run, benchmark=False)
     made.log(run, job_log.begun())
-    assert made.look(cores=1).left.seconds == pytest.approx(20, abs=1)  # the run and its figure
+    found = made.look(cores=1)
+    (running,) = found.those(State.RUNNING)
+    elapsed = (found.when - running.log.begun).total_seconds()
+    assert found.left == pytest.approx(20 - elapsed, abs=0.5)  # the run and its figure
 
 
 @pytest.fixture
@@ -460,3 +463,45 @@ def test_outside_of_a_project_it_says_so(project, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert project("quick")[0] == 2
     assert "in the project's folder" in project()[2]
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(name, size):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x" * size)
+
+    return write
+
+
+def test_every_byte_is_counted_once(tmp_path, write):
+    sizes = {"runs/a.h5": 1, "sweeps/s/shards/b.h5": 20, "sweeps/s/sweep.h5": 300, "logs/shard/s/b.log": 4000}
+    sizes |= {"report.html": 50_000, "strange/c": 600_000, "sweeps/s/shards/old.h5": 7_000_000}
+    for name, size in sizes.items():
+        write(name, size)
+    use = status.use_of(tmp_path, {"sweeps/s/shards/b.h5"})
+    assert use.kinds == {"runs": 1, "shards": 7_000_020, "sweeps": 300, "logs": 4000, "other": 650_000}
+    assert use.total == sum(sizes.values())
+    assert use.stale == {"sweeps/s/shards/old.h5": 7_000_000}
+
+
+def test_what_is_no_result_is_named(tmp_path, write, gone):
+    mine, theirs = (f"runs/.a.h5.{process}.part" for process in (os.getpid(), gone))
+    write(mine, 3)
+    write(theirs, 5)
+    write("sweeps/s/shards/b.h5.damaged", 7)
+    use = status.use_of(tmp_path, set())
+    assert (use.kinds["unfinished"], use.leftover) == (8, {theirs: 5})
+    assert (use.damaged, use.stale) == ({"sweeps/s/shards/b.h5.damaged": 7}, {})
+    assert use.total == 15
+
+
+def test_links_are_not_followed(tmp_path, write):
+    write("runs/a.h5", 1000)
+    (tmp_path / "runs" / "loop").symlink_to(tmp_path)
+    (tmp_path / "runs" / "b.h5").symlink_to("a.h5")
+    assert status.use_of(tmp_path, set()).total < 2000
+
+
+def test_no_folder_takes_nothing(tmp_path):
+    assert status.use_of(tmp_path / "nowhere", set()).total == 0

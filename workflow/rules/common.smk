@@ -10,9 +10,7 @@ from stiffdice.cli.progress import notes
 from stiffdice.errors import InputError, printable
 from stiffdice.study import config as studies
 from stiffdice.study import job_log
-from stiffdice.study import output_digest as made
 from stiffdice.study import outputs as results
-from stiffdice.study import provenance as asked
 from stiffdice.study.catalogue import DRAWINGS, TABLES
 from stiffdice.sweep import partition as shards
 
@@ -63,7 +61,7 @@ def needs_of(name):
 @cache
 def asked_by(name):
     needs_of(name)
-    return asked.of(study(name))
+    return results.asked(study(name))
 
 
 @cache
@@ -83,7 +81,7 @@ def asked_of(stage, name):
 @cache
 def stale_files(name):
     top = Path("results", name)
-    return [f"{top}/{file}" for result in asked.stale(asked_by(name), top) for file in result.files]
+    return [f"{top}/{file}" for result in results.stale(asked_by(name), top) for file in result.files]
 
 
 def not_stale(wildcards):
@@ -221,11 +219,11 @@ def set_aside_changed():
     """Keep, as NAME.damaged, what took the place of what a job made, before Snakemake removes it to make that again."""
     for name in {*jobs_due().values()}:
         top = Path("results", name)
-        for result in asked.stale(asked_by(name), top):
+        for result in results.stale(asked_by(name), top):
             told = job_log.read(top / result.log)
             if told is None or f"{top}/{result.benchmark}" not in jobs_due():
                 continue
-            for file in made.changed(told, top, *(file for file in result.files if file in told.made)):
+            for file in job_log.changed(told, top, *(file for file in result.files if file in told.made)):
                 (top / file).rename(top / f"{file}.damaged")
                 print(
                     f"stiffdice: {top}/{file}: not what its job made: another file in its place, or changed by hand; "

@@ -166,11 +166,9 @@ class _Log:
         """Write the last lines of a job that ended well: what it made, and what memory and time it took."""
         import resource
 
-        from stiffdice.study import output_digest
-
         for output in map(Path, job.output):
-            self.say(self._words.made(Path(*output.parts[2:]).as_posix(), output_digest.digest_of(output)))
-        self.say(self._words.memory(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10))
+            self.say(self._words.made(Path(*output.parts[2:]).as_posix(), self._words.digest_of(output)))
+        self.say(self._words.memory((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) / 1e6))
         self.say(self._words.done(time.monotonic() - self._begun))
 
     def end(self, error: BaseException) -> NoReturn:

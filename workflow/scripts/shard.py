@@ -24,7 +24,7 @@ def make(job: Job, say: Say) -> None:
     watch = Stopwatch()
     with watch.running():
         cells = compute_shard(planned, pieces, target, tenths(say), kept)
-    say(job_log.cells(cells, planned.members))
+    say(job_log.cells(cells, cells * planned.members))
     if kept:
         say(f"of these, {len(kept)} cells kept from shards of an earlier plan")
     say(f"simulation: {watch.seconds:.3f} s")

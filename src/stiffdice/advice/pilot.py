@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.model_selection import least_model
-from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.state import Array
+from stiffdice.dynamics.state import Array, along
 from stiffdice.experiments.measuring import states_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene

@@ -9,7 +9,7 @@ import struct
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from zipfile import ZipFile, ZipInfo
@@ -23,7 +23,6 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED = 1 << 0  # of a member's flags
 _HEADER = 30  # bytes of a member before its name
 _SMALL = 1_000_000  # bytes that a member may come to, whatever its ratio
-
 
 # What an archive may hold at most.
 MOST_BYTES = 20_000_000_000  # unpacked
@@ -69,47 +68,29 @@ def _check(members: Sequence[ZipInfo]) -> None:
     if len(members) > MOST_MEMBERS:
         raise RefusedError(f"{len(members)} members; allowed are {MOST_MEMBERS}")
     check_names([member.orig_filename for member in members])
-    for member in members:
-        if reason := _wrong(member):
-            raise RefusedError(f"{member.orig_filename[:200]}: {reason}")
+    end = 0
+    for member in sorted(members, key=lambda member: member.header_offset):
+        name, method, size, packed = member.filename, member.compress_type, member.file_size, member.compress_size
+        kind = stat.S_IFMT(member.external_attr >> 16)
+        reasons = {
+            "has a second name": name != member.orig_filename,  # some versions of zipfile take it instead
+            "is a link or a special file; allowed are files and folders": kind
+            not in {0, stat.S_IFDIR if name.endswith("/") else stat.S_IFREG},
+            "is encrypted": member.flag_bits & _ENCRYPTED,
+            f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
+            f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
+            # Fifield 2019, "A better zip bomb", USENIX WOOT; zipfile sees it from Python 3.11.8, 3.12.2 and 3.13 on.
+            "overlaps another member": member.header_offset < end,
+        }
+        _refuse_first(member.orig_filename, reasons)
+        end = member.header_offset + _HEADER + packed
     if sum(member.file_size for member in members) > MOST_BYTES:
         raise RefusedError(f"more than {MOST_BYTES} bytes unpacked; this is no archive of a study")
-    _check_overlaps(members)
 
 
-def _wrong(member: ZipInfo) -> str | None:
-    """Return why a member must not be unpacked."""
-    method, size, packed = member.compress_type, member.file_size, member.compress_size
-    kind = stat.S_IFMT(member.external_attr >> 16)
-    reasons = {
-        "has a second name": member.filename != member.orig_filename,  # some versions of zipfile take it instead
-        "is a link or a special file; allowed are files and folders": kind
-        not in {0, stat.S_IFDIR if _is_folder(member.filename) else stat.S_IFREG},
-        "is encrypted": member.flag_bits & _ENCRYPTED,
-        f"compression {method}; allowed are none (0) and deflate (8)": method not in _METHODS,
-        f"{size} bytes out of {packed}; allowed are {MOST_RATIO} for one": size > max(_SMALL, MOST_RATIO * packed),
-    }
-    return next((reason for reason, holds in reasons.items() if holds), None)
-
-
-def _is_folder(name: str) -> bool:
-    return name.endswith("/")  # ZipInfo.is_dir of an empty name raises IndexError up to Python 3.11
-
-
-def _wrong_name(name: str) -> str | None:
-    """Return why a name must not be in an archive: it leads elsewhere, here or on another system."""
-    parts = name.removesuffix("/").split("/")
-    reasons = {
-        "a name with a character that is not printed": not name.isprintable(),  # also NUL, and what turns text around
-        "an absolute path": name.startswith("/"),
-        "a name with a backslash or a colon, which some systems take for a path": "\\" in name or ":" in name,
-        "a path that climbs out": ".." in parts,
-        "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
-        "a path with an empty part": "" in parts,
-        "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
-        f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
-    }
-    return next((reason for reason, holds in reasons.items() if holds), None)
+def _refuse_first(name: str, reasons: Mapping[str, object]) -> None:
+    for reason in (reason for reason, holds in reasons.items() if holds):
+        raise RefusedError(f"{name[:200]}: {reason}")
 
 
 def check_names(names: Sequence[str]) -> None:
@@ -120,8 +101,18 @@ def check_names(names: Sequence[str]) -> None:
     spelt: dict[str, str] = {}  # each path of a file or folder, as a file system may know it and as it is said
     folders: set[str] = set()
     for name in names:
-        if reason := _wrong_name(name):
-            raise RefusedError(f"{name[:200]}: {reason}")
+        parts = name.removesuffix("/").split("/")
+        reasons = {
+            "a name with a character that is not printed": not name.isprintable(),  # also NUL, what turns text
+            "an absolute path": name.startswith("/"),
+            "a name with a backslash or a colon, which some systems take for a path": "\\" in name or ":" in name,
+            "a path that climbs out": ".." in parts,
+            "a path that some systems take for another": any(part.strip(" ").rstrip(".") != part for part in parts),
+            "a path with an empty part": "" in parts,
+            "a path with a part longer than 255 bytes": max(len(part.encode()) for part in parts) > 255,
+            f"{len(parts)} parts in a name; allowed are {MOST_PARTS}": len(parts) > MOST_PARTS,
+        }
+        _refuse_first(name, reasons)
         for path in (name[: found.end()] for found in re.finditer("/|[^/]$", name)):
             if path in folders:
                 continue
@@ -131,47 +122,28 @@ def check_names(names: Sequence[str]) -> None:
                 reason = "is there twice" if twice else f"a name that some systems take for {spelt[folded]}"
                 raise RefusedError(f"{path}: {reason}")
             spelt[folded] = path
-            if _is_folder(path):
+            if path.endswith("/"):
                 folders.add(path)
         if len(folders) > MOST_FOLDERS:
             raise RefusedError(f"more than {MOST_FOLDERS} folders; this is no archive of a study")
 
 
-def _check_overlaps(members: Sequence[ZipInfo]) -> None:
-    """Raise RefusedError if two members share bytes (Fifield 2019, "A better zip bomb", USENIX WOOT).
-
-    zipfile itself does so from Python 3.11.8, 3.12.2 and 3.13 on, when the member is read.
-    """
-    end = 0
-    for member in sorted(members, key=lambda member: member.header_offset):
-        if member.header_offset < end:
-            raise RefusedError(f"{member.filename}: overlaps another member")
-        end = member.header_offset + _HEADER + member.compress_size
-
-
 def _unpack_all(archive: ZipFile, folder: Path, damaged: dict[str, str] | None) -> None:
     for member in archive.infolist():
+        path = folder / member.filename
+        if member.filename.endswith("/"):
+            path.mkdir(parents=True, exist_ok=True)
+            continue
+        path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            _unpack(archive, member, folder / member.filename)
+            # Not through anything that is there; every folder above is one that we made.
+            with archive.open(member) as file, path.open("xb") as out:
+                shutil.copyfileobj(file, out, AT_ONCE)
+                if out.tell() != member.file_size:
+                    raise zipfile.BadZipFile(f"{out.tell()} bytes instead of {member.file_size}")
         except _DAMAGED as error:
+            path.unlink(missing_ok=True)
             reason = f"damaged: {error or 'cut short'}"
             if damaged is None:
                 raise RefusedError(f"{archive.filename}: {member.filename}: {reason}") from None
             damaged[member.filename] = reason
-
-
-def _unpack(archive: ZipFile, member: ZipInfo, path: Path) -> None:
-    """Unpack one member; raises one of _DAMAGED, and leaves no file, if its content is damaged."""
-    if _is_folder(member.filename):
-        path.mkdir(parents=True, exist_ok=True)
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        # Not through anything that is there; every folder above is one that we made.
-        with archive.open(member) as file, path.open("xb") as out:
-            shutil.copyfileobj(file, out, AT_ONCE)
-            if out.tell() != member.file_size:
-                raise zipfile.BadZipFile(f"{out.tell()} bytes instead of {member.file_size}")
-    except _DAMAGED:
-        path.unlink(missing_ok=True)
-        raise

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import stat
-from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
 
-from stiffdice.archive import contents, crate, manifest, preview
-from stiffdice.archive.citation import Citation
-from stiffdice.archive.sizes import Size, Sizes
+from stiffdice.archive import contents, crate, manifest
+from stiffdice.archive.contents import Sizes
+from stiffdice.archive.extract import AT_ONCE
 from stiffdice.errors import InputError
 from stiffdice.io.writer import check_target, whole
 from stiffdice.study.config import Study
 
-# What WorkflowHub knows a crate by; zip programs go by the last part of it.
-SUFFIX = ".crate.zip"
-
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip file can say
 _UNIX = 3
-_AT_ONCE = 1 << 20  # bytes read at a time
 
 
 class Packed(NamedTuple):
@@ -30,11 +25,6 @@ class Packed(NamedTuple):
     path: Path
     size: int
     sizes: Sizes
-
-
-def default_target(study: Study, root: Path, version: str) -> Path:
-    """Return where an archive is stored if nobody says otherwise: in a folder that is no study's."""
-    return root / "results" / "archives" / f"{study.name}-{version}{SUFFIX}"
 
 
 def pack(study: Study, root: Path, target: str | Path, agent: str | None = None) -> Packed:
@@ -49,32 +39,29 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
     digests = {file.path: manifest.digest_of(file.source) for file in files}
     runs, software = contents.read(files)
     with whole(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
-        for folder in sorted(_folders(digests)):
+        # What a crate describes has to be there, folders, too.
+        folders = {folder for name in digests for folder in PurePosixPath(name).parents} - {PurePosixPath()}
+        for folder in sorted(f"{folder}/" for folder in folders):
             archive.writestr(_info(folder, stat.S_IFDIR | 0o755, ZIP_STORED), b"")
         for file in files:
             _add(archive, file, digests[file.path])
         facts = crate.Facts(
             study,
-            Citation.load(root / "CITATION.cff"),
+            crate.Citation.load(root / "CITATION.cff"),
             files,
             contents.scenes_of(study.name, root),
             {name: (archive.getinfo(name).file_size, digest) for name, digest in digests.items()},
-            _sizes(archive, files, runs),
+            Sizes.of(archive, files, runs),
             software,
             crate.span_of(files),
             agent,
         )
         # What describes the others comes last.
-        for name, text in ((preview.NAME, preview.page(facts)), (crate.NAME, crate.metadata(facts))):
+        for name, text in ((crate.PREVIEW, crate.page(facts)), (crate.NAME, crate.metadata(facts))):
             digests[name] = hashlib.sha256(text.encode()).hexdigest()
             archive.writestr(_info(name), text)
         archive.writestr(_info(manifest.NAME), manifest.text_of(digests))
     return Packed(path, path.stat().st_size, facts.sizes)
-
-
-def _folders(names: Iterable[str]) -> set[str]:
-    """Return the folders of files, with a / at the end: what a crate describes has to be there."""
-    return {f"{folder}/" for name in names for folder in map(str, PurePosixPath(name).parents) if folder != "."}
 
 
 def _info(name: str, mode: int = stat.S_IFREG | 0o644, method: int = ZIP_DEFLATED) -> ZipInfo:
@@ -92,15 +79,8 @@ def _add(archive: ZipFile, file: contents.File, sha256: str) -> None:
     info.file_size = about.st_size  # so that zipfile takes 64 bits where they are needed
     digest = hashlib.sha256()
     with file.source.open("rb") as source, archive.open(info, "w") as member:
-        while block := source.read(_AT_ONCE):
+        while block := source.read(AT_ONCE):
             digest.update(block)
             member.write(block)
     if digest.hexdigest() != sha256:
         raise InputError(f"{file.path}: was changed while it was packed; wait until its study is done")
-
-
-def _sizes(archive: ZipFile, files: Sequence[contents.File], runs: Mapping[str, int]) -> Sizes:
-    members = {kind: [file.path for file in files if file.kind == kind] for kind in contents.KINDS}
-    members = {kind: paths for kind, paths in members.items() if paths} | {"all": [file.path for file in files]}
-    kinds = {kind: Size.of(map(archive.getinfo, paths)) for kind, paths in members.items()}
-    return Sizes(kinds, sum(runs.values()), Size.of(map(archive.getinfo, runs)))

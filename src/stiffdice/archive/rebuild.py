@@ -11,24 +11,25 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
 
 from stiffdice import __version__
-from stiffdice.archive import installed, manifest, sandbox
-from stiffdice.archive.compare.compare import Comparison, compare
+from stiffdice.archive import contents, manifest, sandbox
+from stiffdice.archive.compare import Comparison, compare
 from stiffdice.archive.extract import unzip
-from stiffdice.archive.installed import Code
 from stiffdice.archive.sandbox import Way
 from stiffdice.archive.verify import verify
+from stiffdice.dynamics.code_digest import PACKAGE
 from stiffdice.errors import OutputError, RefusedError, StiffdiceError, printable
 from stiffdice.io.text_file import LARGEST_TABLE, text_of
 from stiffdice.study import config as studies
 
 LAST_LINES = 20  # of a run that failed, to show
+SHOWN = 5  # of files that are other
 
 # In the folder of a rebuild: the archive, out of a sandbox's sight; what runs and what it makes; what the run says.
 ARCHIVED, REBUILT, LOG = "archived", "rebuilt", "rebuild.log"
@@ -36,6 +37,10 @@ _NOTHING = "nothing"  # an empty folder, for results that are not in their place
 
 # What the installed code is given of an archive: files that Python cannot import.
 _READ = (".yaml", ".yml", ".json")
+
+# What a run executes: of an archive, and of this installation.
+_CODE = ("Snakefile", "src", "workflow")
+_VERSION = re.compile(r'^__version__ = "([0-9A-Za-z.+-]{1,40})"', re.MULTILINE)
 
 _LOG_READ = 1 << 20  # bytes at the end of a log
 
@@ -49,6 +54,32 @@ class RunError(StiffdiceError):
 
     def __str__(self) -> str:
         return "\n  ".join([super().__str__(), *self._last])
+
+
+class Code(NamedTuple):
+    """What an archive's code is beside the installed.
+
+    version: of the archive's code, as it says itself. files: how many files of code the archive or this installation
+    has. other: those that are not in both, or not the same in both. As text, how it differs.
+    """
+
+    version: str
+    files: int
+    other: tuple[str, ...]
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether all that a run executes is installed here, to the last bit."""
+        return not self.other
+
+    def __str__(self) -> str:
+        names = ", ".join(self.other[:SHOWN])
+        more = f" and {len(self.other) - SHOWN} more" if len(self.other) > SHOWN else ""
+        has = "" if has_workflow() else "; a package has no Snakefile and no workflow/, a checkout has"
+        return (
+            f"its code says to be stiffdice {self.version}, installed is {__version__}{has}: "
+            f"{len(self.other)} of {self.files} files differ: {names}{more}"
+        )
 
 
 class Opened(NamedTuple):
@@ -110,12 +141,28 @@ def opened(archive: str | Path, folder: str | Path | None = None) -> Iterator[Op
     Raises RefusedError if the archive does not pass `verify`, InputError if it cannot be read; nothing is left then,
     but of a run that failed.
     """
-    with _place(folder) as place:
+    with ExitStack() as unless_done:
+        if folder is None:
+            temporary = tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True)
+            place = Path(unless_done.enter_context(temporary))
+        else:
+            place = Path(folder)
+            try:
+                place.mkdir(mode=0o700)
+            except OSError as error:
+                raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
+            unless_done.callback(shutil.rmtree, place, ignore_errors=True)
         unzip(archive, place / ARCHIVED)
-        listed = _checked(archive, place / ARCHIVED)
-        study = _study_of(archive, listed)
-        code = installed.compared(place / ARCHIVED, listed)
-        yield Opened(str(archive), place, folder is not None, study, listed, code)
+        listed, study = _checked(archive, place / ARCHIVED)
+        code = compared_code(place / ARCHIVED, listed)
+        try:
+            yield Opened(str(archive), place, folder is not None, study, listed, code)
+        except RunError:
+            if folder is not None:
+                unless_done.pop_all()
+            raise
+        if folder is not None:
+            unless_done.pop_all()
 
 
 def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
@@ -144,9 +191,14 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     """
     notes = other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
     _fill(unpacked)
-    said = _run(unpacked, way, cores)
-    notes += [line for line in said if "left out:" in line]
-    found = _compared(unpacked)
+    notes += [line for line in _run(unpacked, way, cores) if "left out:" in line]
+    archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
+    if made.resolve() != made:  # a link, to the archive's own perhaps
+        made = unpacked.folder / _NOTHING
+    made.mkdir(parents=True, exist_ok=True)
+    found = compare(archived, made)
+    # What is only in B was not asked for.
+    found = replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))
     if found.files == 0 and found.same:
         notes.append("there was nothing to compare")
     if not unpacked.code.is_installed:
@@ -156,48 +208,22 @@ def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
     return Rebuilt(unpacked, found, notes)
 
 
-@contextmanager
-def _place(folder: str | Path | None) -> Iterator[Path]:
-    """Give a new folder; a temporary one is gone afterwards, another if anything but the run fails."""
-    if folder is None:
-        with tempfile.TemporaryDirectory(prefix="stiffdice-rebuild-", ignore_cleanup_errors=True) as temporary:
-            yield Path(temporary)
-        return
-    place = Path(folder)
-    try:
-        place.mkdir(mode=0o700)
-    except OSError as error:
-        raise OutputError(f"{place}: {error.strerror}; name a new folder") from None
-    try:
-        yield place
-    except RunError:
-        raise
-    except BaseException:
-        shutil.rmtree(place, ignore_errors=True)
-        raise
-
-
-def _checked(archive: str | Path, place: Path) -> dict[str, str]:
-    """Return the manifest of an unpacked archive that passes every check; raises RefusedError."""
+def _checked(archive: str | Path, place: Path) -> tuple[dict[str, str], str]:
+    """Return manifest and study of an unpacked archive that passes every check; raises RefusedError for any other."""
     if not (place / manifest.NAME).is_file():
         raise RefusedError(f"{archive}: has no {manifest.NAME}; not an archive of stiffdice")
-    report = verify(place)
-    if not report.ok:
-        first = report.problems[0]
-        raise RefusedError(f"{archive}: {first.file}: {first.reason}; not run. stiffdice verify names all that fails")
-    return manifest.parse((place / manifest.NAME).read_text(encoding="utf-8"))
-
-
-def _study_of(archive: str | Path, listed: Mapping[str, str]) -> str:
-    """Return the name of the study in an archive; raises RefusedError unless there is one, with all that runs it."""
+    for file, reason in verify(place).problems:
+        raise RefusedError(f"{archive}: {file}: {reason}; not run. stiffdice verify names all that fails")
+    listed = manifest.parse((place / manifest.NAME).read_text(encoding="utf-8"))
     names = {parts[1] for parts in (name.split("/") for name in listed) if parts[0] == "results" and len(parts) > 2}
     if len(names) != 1 or not studies.NAME.fullmatch(min(names)):
         told = ", ".join(sorted(names)) or "none"
         raise RefusedError(f"{archive}: holds results of these studies: {told}; allowed is one")
-    for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{min(names)}.yaml"):
+    (study,) = names
+    for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{study}.yaml"):
         if needed not in listed:
             raise RefusedError(f"{archive}: has no {needed}; it cannot be made again")
-    return min(names)
+    return listed, study
 
 
 def other_versions(lock: Path) -> list[str]:
@@ -213,13 +239,32 @@ def other_versions(lock: Path) -> list[str]:
     return found
 
 
+def is_code(name: str) -> bool:
+    """Return whether a run executes a file of an archive, or may."""
+    return name.partition("/")[0] in _CODE
+
+
+def has_workflow() -> bool:
+    """Return whether the package lies in a checkout of the project, which has the workflow, too."""
+    return all((PACKAGE.parents[1] / name).is_file() for name in ("Snakefile", "workflow/run.py"))
+
+
+def compared_code(folder: Path, listed: Mapping[str, str]) -> Code:
+    """Compare the code of an unpacked archive with the installed, file by file; listed: digests, by path."""
+    root, tops, above = (PACKAGE.parents[1], _CODE, "") if has_workflow() else (PACKAGE.parent, (PACKAGE.name,), "src/")
+    here = (file for top in tops for file in contents.tree(root, top, "code"))
+    ours = {f"{above}{file.path}": manifest.digest_of(file.source) for file in here}
+    theirs = {name: digest for name, digest in listed.items() if is_code(name)}
+    other = sorted(name for name in theirs.keys() | ours.keys() if theirs.get(name) != ours.get(name))
+    said = _VERSION.search((folder / "src/stiffdice/__init__.py").read_text(encoding="utf-8", errors="replace"))
+    return Code(said[1] if said else "unknown", len(theirs.keys() | ours.keys()), tuple(other))
+
+
 def _fill(unpacked: Opened) -> None:
     """Copy what runs: without the results, and beside the installed code only files that are read, not executed."""
-    for name in unpacked.listed:
+    for name in (name for name in unpacked.listed if not name.startswith(f"results/{unpacked.study}/")):
         is_read = name.endswith(_READ) and not name.startswith(".")
-        if name.startswith(f"results/{unpacked.study}/"):
-            continue
-        if not unpacked.code.is_installed or installed.is_code(name) or is_read:
+        if not unpacked.code.is_installed or is_code(name) or is_read:
             target = unpacked.folder / REBUILT / name
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(unpacked.folder / ARCHIVED / name, target)
@@ -229,33 +274,18 @@ def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
     """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
     command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
-    folder, log = unpacked.folder / REBUILT, unpacked.folder / LOG
+    log = unpacked.folder / LOG
     with log.open("wb") as out:
-        running = sandbox.start(way, command, folder, out)
+        running = sandbox.start(way, command, unpacked.folder / REBUILT, out)
         try:
             running.wait()
         finally:
             sandbox.end(running)
-    lines = _last_of(log).splitlines()
-    if running.returncode != 0:
-        where = f", in {unpacked.folder}" if unpacked.kept else ""
-        raise RunError(
-            f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:", lines[-LAST_LINES:]
-        )
-    return lines
-
-
-def _last_of(log: Path) -> str:
     with log.open("rb") as file:
         file.seek(max(0, log.stat().st_size - _LOG_READ))
-        return file.read().decode("utf-8", "replace")
-
-
-def _compared(unpacked: Opened) -> Comparison:
-    """Return how the archive's results (A) and those made again (B) differ; what is only in B was not asked for."""
-    archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
-    if made.resolve() != made:  # a link, to the archive's own perhaps
-        made = unpacked.folder / _NOTHING
-    made.mkdir(parents=True, exist_ok=True)
-    found = compare(archived, made)
-    return replace(found, only_b=(), left_out=tuple(name for name in found.left_out if (archived / name).exists()))
+        lines = file.read().decode("utf-8", "replace").splitlines()
+    if running.returncode != 0:
+        where = f", in {unpacked.folder}" if unpacked.kept else ""
+        told = f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:"
+        raise RunError(told, lines[-LAST_LINES:])
+    return lines

@@ -26,7 +26,6 @@ _HOME, _TEMPORARY = ".home", ".home/tmp"  # in it
 # Of /etc, what programs read before they do anything: where libraries are, which of two is the default, fonts.
 _OF_ETC = ("ld.so.cache", "alternatives", "fonts", "octaverc", "octave.conf", "localtime")
 
-_NEEDED = ("snakemake", "numba", "h5py")
 _PATIENCE = 5.0  # seconds for what was killed to be gone
 
 
@@ -57,7 +56,7 @@ def sandboxed(folder: Path) -> Way:
     prefix += ["--proc", "/proc", "--dev", "/dev", "--bind", str(temporary), "/tmp", *_readable(folder)]
     prefix += ["--bind", str(folder.resolve()), str(_INSIDE), "--chdir", str(_INSIDE), "--"]
     way = Way(tuple(prefix), _INSIDE)
-    found = f"import sys; from importlib.util import find_spec; sys.exit(not all(map(find_spec, {_NEEDED})))"
+    found = "import sys, importlib.util as u; sys.exit(not all(map(u.find_spec, ('snakemake', 'numba', 'h5py'))))"
     tried = subprocess.run(
         [*prefix, sys.executable, "-c", found], env=environment(way), capture_output=True, text=True, check=False
     )
@@ -68,10 +67,7 @@ def sandboxed(folder: Path) -> Way:
 
 
 def _readable(folder: Path) -> list[str]:
-    """Return options of bubblewrap for what can be read: programs and libraries of the system, and this Python.
-
-    What would show the home, or what lies beside the folder, is left out, and Python does not start without it.
-    """
+    """Return options of bubblewrap for what can be read: programs and libraries of the system, and this Python."""
     options = []
     for top in (Path("/", name) for name in ("bin", "sbin", "lib", "lib32", "lib64")):
         if top.is_symlink():
@@ -80,6 +76,7 @@ def _readable(folder: Path) -> list[str]:
             options += ["--ro-bind", str(top), str(top)]
     for name in _OF_ETC:
         options += ["--ro-bind-try", f"/etc/{name}", f"/etc/{name}"]
+    # What would show the home, or what lies beside the folder, is left out, and Python does not start without it.
     # An environment may be a link, and stand on a Python elsewhere, which may be named through a link, too.
     python = (Path(sys.prefix), Path(sys.base_prefix), Path(sys.executable).resolve().parents[1])
     home = Path(os.path.expanduser("~"))  # noqa: PTH111 (which may raise)
@@ -92,18 +89,15 @@ def _readable(folder: Path) -> list[str]:
 
 def unconfined(folder: Path) -> Way:
     """Return how to run a command that can do what this user can; without a network, as far as the system allows."""
-    could = "read, change and remove whatever you can"
-    apart: dict[tuple[str, ...], tuple[str, ...]] = {
-        ("--net", "--pid", "--fork", "--kill-child", "--mount-proc"): (could,),
-        ("--net",): (could, "leave processes behind"),
-    }
+    could, leave = ("read, change and remove whatever you can",), "leave processes behind"
+    together = ("--net", "--pid", "--fork", "--kill-child", "--mount-proc")
     users = ((), ("--map-current-user",), ("--map-root-user",))
-    for (spaces, could_all), user in itertools.product(apart.items(), users):
+    for spaces, user in itertools.product((together, ("--net",)), users):
         prefix = ("setpriv", "--pdeathsig", "KILL", "unshare", *user, *spaces)
         with suppress(OSError):
             if subprocess.run([*prefix, "true"], capture_output=True, check=False).returncode == 0:
-                return Way(prefix, folder.resolve(), could_all)
-    return Way((), folder.resolve(), (could, "leave processes behind", "use the network"))
+                return Way(prefix, folder.resolve(), could if spaces == together else (*could, leave))
+    return Way((), folder.resolve(), (*could, leave, "use the network"))
 
 
 def environment(way: Way) -> dict[str, str]:

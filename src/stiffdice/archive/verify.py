@@ -5,20 +5,21 @@ from __future__ import annotations
 import json
 import re
 import tempfile
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 from urllib.parse import unquote
 
 import h5py
 import xarray as xr
 
 from stiffdice.archive import manifest
-from stiffdice.archive.compare import folders
+from stiffdice.archive.compare import LISTED, SHARDS, listed_in, shards_of
 from stiffdice.archive.consistency import check as sanity
-from stiffdice.archive.consistency import sweeps, words
+from stiffdice.archive.consistency import equations
 from stiffdice.archive.crate import NAME as CRATE
 from stiffdice.archive.extract import unzip
 from stiffdice.errors import InputError, RefusedError, printable
@@ -27,20 +28,18 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.reader import open_file, parts
 from stiffdice.io.text_file import text_of
 from stiffdice.study import config as studies
-from stiffdice.study import job_log, output_digest, provenance
+from stiffdice.study import job_log, outputs
 from stiffdice.sweep.collect import collect
 
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
 _SCHEMA = Path("workflow/schemas/study.schema.yaml")
-_SHARD = re.compile("[0-9a-f]{12}")
 # Of a job, under the folder of its study's results.
 _LOG = re.compile("((?:.*/)?)logs/.+[.]log")
 # Files of these formats need not hold all that the checks look at.
 _BEFORE_SANITY = ("1.0", "1.1")
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """A file that fails, by its path within what was checked, and why."""
 
     file: str
@@ -57,7 +56,7 @@ class Report:
 
     path: str
     kind: str
-    checked: dict[str, int] = field(default_factory=dict)
+    checked: Counter[str] = field(default_factory=Counter)
     not_checked: list[str] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
 
@@ -65,10 +64,6 @@ class Report:
     def ok(self) -> bool:
         """Whether nothing fails."""
         return not self.problems
-
-    def count(self, what: str, number: int = 1) -> None:
-        """Say that so many more were checked."""
-        self.checked[what] = self.checked.get(what, 0) + number
 
     def note(self, what: str) -> None:
         """Say what could not be checked, once."""
@@ -86,12 +81,13 @@ class Report:
         lines += [f"FAILS: {problem.file}: {problem.reason}" for problem in self.problems]
         files = len({problem.file for problem in self.problems})
         end = "nothing fails" if self.ok else f"{_counted('files', files)} must not be trusted"
-        lines.append("; not checked: ".join([end, *([", ".join(self.not_checked)] if self.not_checked else [])]))
+        lines.append(f"{end}; not checked: {', '.join(self.not_checked)}" if self.not_checked else end)
         return [printable(line) for line in lines]
 
     def as_json(self) -> str:
         """Return it for programs."""
-        return json.dumps(asdict(self) | {"ok": self.ok}, indent=2)
+        problems = [problem._asdict() for problem in self.problems]
+        return json.dumps({**vars(self), "problems": problems, "ok": self.ok}, indent=2)
 
 
 def _counted(what: str, number: int) -> str:
@@ -107,11 +103,11 @@ def verify(path: str | Path) -> Report:
     shards add up to it and its frontier follows from it. A zip file is unpacked into a temporary folder. Raises
     InputError if there is nothing to check, or a zip file that must not be unpacked.
     """
-    place = Path(path)
+    place, damaged = Path(path), dict[str, str]()
     if place.is_dir():
         is_archive = (place / manifest.NAME).is_file()
         report = Report(str(path), "unpacked archive" if is_archive else "folder of results")
-        _check_folder(report, place, is_archive, {})
+        _check_folder(report, place, is_archive, damaged)
         return report
     if not place.is_file():
         raise InputError(f"{path}: {'not a file or folder' if place.exists() else 'No such file or folder'}")
@@ -122,7 +118,6 @@ def verify(path: str | Path) -> Report:
     report = Report(str(path), "archive")
     with tempfile.TemporaryDirectory(prefix="stiffdice-verify-") as temporary:
         folder = Path(temporary) / "archive"
-        damaged: dict[str, str] = {}
         unzip(place, folder, damaged)
         if not (folder / manifest.NAME).is_file() and manifest.NAME not in damaged:
             raise RefusedError(f"{path}: has no {manifest.NAME}; not an archive of stiffdice")
@@ -144,17 +139,10 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
     for name, reason in damaged.items():
         report.fail(name, reason)
     if is_archive:
-        report.count("files", len(files))
+        report.checked["files"] += len(files)
         digests = {name: manifest.digest_of(path) for name, path in files.items()} | dict.fromkeys(damaged, "")
-        for name, check in ((manifest.NAME, _check_manifest), (CRATE, _check_crate)):
-            if name in damaged:
-                continue
-            try:
-                if name not in files:
-                    raise RefusedError("missing; every archive has one")
-                check(report, text_of(files[name], _LARGEST_TEXT), digests)
-            except InputError as error:
-                report.fail(name, _reason(error, files.get(name, name)))
+        _check_digests(report, manifest.NAME, "listed", files, digests)
+        _check_digests(report, CRATE, "described", files, digests)
         _check_made(report, folder, files)
     else:
         report.note(f"digests (there is no {manifest.NAME})")
@@ -162,25 +150,30 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
     _Files(report, data, files).check_all()
 
 
-def _check_manifest(report: Report, text: str, digests: Mapping[str, str]) -> None:
-    """Check files both ways; digests: of what is there, empty where that is damaged."""
-    listed = manifest.parse(text)
-    report.count("digests", len(listed))
-    _check_digests(report, listed, digests, f"listed in {manifest.NAME}")
-    for name in sorted(digests.keys() - listed.keys() - {manifest.NAME}):
-        report.fail(name, f"there, but not listed in {manifest.NAME}")
+def _check_digests(report: Report, name: str, how: str, files: Mapping[str, Path], digests: Mapping[str, str]) -> None:
+    """Check what a manifest or a description says of files; digests: of what is there, empty where it is damaged."""
+    if name not in files:
+        report.fail(name, *(["missing; every archive has one"] if name not in digests else []))
+        return
+    try:
+        text = text_of(files[name], _LARGEST_TEXT)
+        told: Mapping[str, str | None] = manifest.parse(text) if name == manifest.NAME else _described(report, text)
+    except InputError as error:
+        report.fail(name, _reason(error, files[name]))
+        return
+    report.checked["digests" if name == manifest.NAME else "described_files"] += len(told)
+    for file, digest in told.items():
+        if file not in digests:
+            report.fail(file, f"missing, but {how} in {name}")
+        elif digests[file] and digest not in (None, digests[file]):
+            report.fail(file, f"changed: its SHA-256 is {digests[file]}, but {digest} is {how} in {name}")
+    if name == manifest.NAME:
+        for file in sorted(digests.keys() - told.keys() - {name}):
+            report.fail(file, f"there, but not listed in {name}")
 
 
-def _check_digests(report: Report, told: Mapping[str, str], digests: Mapping[str, str], where: str) -> None:
-    for name, digest in told.items():
-        if name not in digests:
-            report.fail(name, f"missing, but {where}")
-        elif digests[name] not in ("", digest):
-            report.fail(name, f"changed: its SHA-256 is {digests[name]}, but {digest} is {where}")
-
-
-def _check_crate(report: Report, text: str, digests: Mapping[str, str]) -> None:
-    """Check that the crate's description can be read, and that what it says of files is so."""
+def _described(report: Report, text: str) -> dict[str, str | None]:
+    """Return the digest that a crate's description says of each file, None where it says none."""
     try:
         entities = {str(entity["@id"]): entity for entity in json.loads(text)["@graph"]}
         types = {name: entity.get("@type") for name, entity in entities.items()}
@@ -188,14 +181,11 @@ def _check_crate(report: Report, text: str, digests: Mapping[str, str]) -> None:
         raise RefusedError(f"not an RO-Crate's description ({type(error).__name__}: {error})") from None
     for needed in sorted({"./", CRATE} - entities.keys()):
         report.fail(CRATE, f"has no entity {needed}")
-    described = [
-        (unquote(name).removeprefix("./"), entities[name])
+    return {
+        unquote(name).removeprefix("./"): str(entities[name]["sha256"]) if "sha256" in entities[name] else None
         for name, kind in types.items()
         if "File" in (kind if isinstance(kind, list) else [kind]) and "://" not in name
-    ]
-    report.count("described_files", len(described))
-    told = {name: str(entity.get("sha256", digests.get(name))) for name, entity in described}
-    _check_digests(report, told, digests, f"described in {CRATE}")
+    }
 
 
 def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> None:
@@ -204,7 +194,7 @@ def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> Non
     try:
         if not _SCHEMA.is_file() or folder.resolve() != Path("results", name).resolve():
             raise InputError("this is not its project's folder")
-        stale = provenance.stale(provenance.of(studies.load(f"config/{name}.yaml", _SCHEMA)), folder)
+        stale = outputs.stale(outputs.asked(studies.load(f"config/{name}.yaml", _SCHEMA)), folder)
     except InputError as error:
         report.note(f"whether a study asks for these results ({error})")
         _check_made(report, folder, files)
@@ -221,8 +211,8 @@ def _check_made(report: Report, folder: Path, files: Mapping[str, Path]) -> None
             continue
         there = [file for file in told.made if log[1] + file in files]
         untold.difference_update(log[1] + file for file in there)
-        for file in output_digest.changed(told, folder / log[1], *there):
-            report.fail(log[1] + file, output_digest.reason(told, [file]))
+        for file in job_log.changed(told, folder / log[1], *there):
+            report.fail(log[1] + file, job_log.reason_of_change(told, [file]))
     if untold:
         report.note(f"whether {len(untold)} .h5 files are what their jobs made (no log says it)")
 
@@ -245,8 +235,8 @@ class _Files:
         for name in sorted(name for name in self._data if PurePosixPath(name).name == "sweep.h5"):
             done |= self._check_sweep(PurePosixPath(name).parent)
         for name in (name for name in self._data if name not in done):
-            for kind in {sanity.kind_of(part) for part in self._checked(name)} & sanity.NOT_SEEN.keys():
-                self._report.note(sanity.NOT_SEEN[kind])
+            for part in self._checked(name):
+                self._report.note(sanity.NOT_SEEN[sanity.kind_of(part)])
 
     def _check_sweep(self, folder: PurePosixPath) -> set[str]:
         """Check a sweep with its shards and its frontier; return what was checked."""
@@ -260,25 +250,24 @@ class _Files:
             self._report.note(sanity.NOT_SEEN["sweep"])
         frontier = next(self._checked(edges), None) if edges in self._data else None
         if collected is not None and frontier is not None:
-            self._compare(edges, lambda: sweeps.same_as_found(frontier, collected))
+            try:
+                self._report.fail(edges, *equations.same_as_found(frontier, collected))
+            except Exception as error:  # whatever hostile files make of it
+                self._report.fail(edges, f"cannot be computed again ({_reason(error)})")
         return {whole, edges, *names}
 
     def _shards_of(self, folder: PurePosixPath) -> list[str]:
         """Return the shards that a sweep was collected from; those that are not there fail."""
-        table = str(folder / folders.LISTED)
+        table = str(folder / LISTED)
         if table not in self._files:
-            return folders.shards_of(self._data).get(str(folder / folders.SHARDS), [])
+            return shards_of(self._data).get(str(folder / SHARDS), [])
         try:
-            shards = folders.listed_in(self._files[table])
-            if not all(_SHARD.fullmatch(shard or "") for shard in shards):
-                raise RefusedError("names a shard that is none; allowed are 12 hexadecimal digits")
+            names = [str(folder / SHARDS / f"{shard}.h5") for shard in listed_in(self._files[table])]
         except InputError as error:
             self._report.fail(table, _reason(error, self._files[table]))
             return []
-        names = [str(folder / folders.SHARDS / f"{shard}.h5") for shard in shards]
-        for name in names:
-            if name not in self._files:
-                self._report.fail(name, f"missing, but listed in {table}")
+        for name in (name for name in names if name not in self._files):
+            self._report.fail(name, f"missing, but listed in {table}")
         return names
 
     def _collect_again(self, whole: str, collected: xr.Dataset, names: Sequence[str]) -> None:
@@ -287,26 +276,20 @@ class _Files:
         try:
             criteria = meanings_of(collected["criterion"])
             again = collect(each, dict(zip(criteria, map(float, collected["tolerance"].values), strict=True)))
+            found = equations.same_as_collected(collected, again)
         except Exception as error:  # whatever hostile shards make of it
             deque(each, 0)  # those that it did not come to are checked, too
-            self._report.fail(whole, f"its shards do not add up to a sweep ({_reason(error)})")
-            return
+            found = [f"its shards do not add up to a sweep ({_reason(error)})"]
         if self._unread.isdisjoint(names):
-            self._compare(whole, lambda: sweeps.same_as_collected(collected, again))
+            self._report.fail(whole, *found)
         else:
             self._report.note(f"whether the shards of {whole} add up to it (not all can be read)")
 
-    def _compare(self, name: str, compared: Callable[[], list[str]]) -> None:
-        try:
-            self._report.fail(name, *compared())
-        except Exception as error:  # whatever hostile files make of it
-            self._report.fail(name, f"cannot be computed again ({_reason(error)})")
-
     def _checked(self, name: str) -> Iterator[xr.Dataset]:
         """Yield a file's dataset, of a shard part by part, checked; if it cannot be read to its end, the file fails."""
-        path, cells = self._data[name], 0
-        is_shard = PurePosixPath(name).parent.name == folders.SHARDS
-        self._report.count("hdf5_files")
+        path, cells, report = self._data[name], 0, self._report
+        is_shard = PurePosixPath(name).parent.name == SHARDS
+        report.checked["hdf5_files"] += 1
         try:
             if str(path) in self._refused:
                 raise self._refused[str(path)]
@@ -316,20 +299,19 @@ class _Files:
                     cells += part.sizes["cell"]
                     where = f"cells {first} to {cells - 1}, counted from {first}: "
                 if is_shard or sanity.kind_of(part) == "run":
-                    self._report.count("runs", part.sizes.get("cell", 1) * part.sizes.get("member", 1))
-                self._report.fail(name, *(where + problem for problem in self._problems(part)))
+                    report.checked["runs"] += part.sizes.get("cell", 1) * part.sizes.get("member", 1)
+                problems, version = schema.problems(part) + sanity.word_problems(part), part.attrs.get("format_version")
+                if version in _BEFORE_SANITY:
+                    report.note(
+                        f"numbers in files of format {version} (they have no seal, so no change of them is seen)"
+                    )
+                else:
+                    problems += sanity.problems(part)
+                report.fail(name, *(where + problem for problem in problems))
                 yield part
         except Exception as error:  # whatever a hostile file makes of its readers
-            self._report.fail(name, _reason(error, path))
+            report.fail(name, _reason(error, path))
             self._unread.add(name)
-
-    def _problems(self, dataset: xr.Dataset) -> list[str]:
-        problems = schema.problems(dataset) + words.problems(dataset)
-        version = str(dataset.attrs.get("format_version", ""))
-        if version not in _BEFORE_SANITY:
-            return problems + sanity.problems(dataset)
-        self._report.note(f"numbers in files of format {version} (they have no seal, so no change of them is seen)")
-        return problems
 
 
 def _reason(error: Exception, source: str | Path = "") -> str:

@@ -68,16 +68,6 @@ def add(advise: argparse.ArgumentParser) -> None:
         either.get(name, scene).add_argument(f"--{name.replace('_', '-')}", metavar=metavar, help=text)
 
 
-def _given(options: argparse.Namespace) -> list[str]:
-    """Return the changes to a scene that the options of `advise` ask for, as `key.path=value`."""
-    given = []
-    for name, (key, _) in _KEYS.items():
-        text = getattr(options, name)
-        if text is not None:
-            given.append(f"{key}=[{text}]" if name in _VECTORS else f"{key}={text}")
-    return given + options.overrides
-
-
 def _in_radii(text: str, scene: Scene) -> str:
     """Return an error as a part of the radius if it is given as a length, any other as it is."""
     from stiffdice.scene import units
@@ -95,17 +85,17 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.io import seal
     from stiffdice.scene import scene as scenes
 
-    changes = _given(options)
-    if options.scene is None:
-        scene = scenes.changed({}, changes, options.preset)
-    else:
-        scene = scenes.load(options.scene, changes, options.preset)
+    asked = ((key, getattr(options, name), name in _VECTORS) for name, (key, _) in _KEYS.items())
+    changes = [f"{key}=[{text}]" if vector else f"{key}={text}" for key, text, vector in asked if text is not None]
+    changes += options.overrides
+    file, preset = options.scene, options.preset
+    scene = scenes.load(file, changes, preset) if file is not None else scenes.changed({}, changes, preset)
     horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
     target = None
     if options.output is not None:
         if not options.run:
             raise InputError("-o: a file is written with --run only")
-        target = common.target_of(options.output, options.force, seal.is_sealed, *filter(None, [options.scene]))
+        target = common.target_of(options.output, options.force, seal.is_sealed, *filter(None, [file]))
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
@@ -134,7 +124,7 @@ def call(options: argparse.Namespace) -> int:
     else:
         for line in scene.derived:
             print(line)
-        print(advice_page.as_text(given, common.scene_words(options, changes) if options.scene else []))
+        print(advice_page.as_text(given, common.scene_words(options, changes) if file else []))
         if check is not None:
             print("\n" + advice_page.check_as_text(check))
             if target is not None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from pathlib import Path
 
+from stiffdice import __version__
 from stiffdice.cli import common
 
 HELP = "pack a finished study with all that made it into one file"
@@ -23,9 +25,8 @@ each. To be called in the project's folder.
 def add(archive: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     archive.add_argument("study", metavar="STUDY", help="the name of a file in config/, without .yaml")
-    archive.add_argument(
-        "-o", dest="output", metavar="FILE.zip", help="default: results/archives/STUDY-VERSION.crate.zip"
-    )
+    told = "default: results/archives/STUDY-VERSION.crate.zip"
+    archive.add_argument("-o", dest="output", metavar="FILE.zip", help=told)
     archive.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
     archive.add_argument("--agent", metavar="NAME", help="who ran the study, if the archive is to say so")
     archive.add_argument("--json", action="store_true", help="sizes for programs")
@@ -35,25 +36,22 @@ def call(options: argparse.Namespace) -> None:
     """Pack the study, and print how much room it takes."""
     import json
 
-    from stiffdice import __version__
     from stiffdice.archive import pack
-    from stiffdice.archive.sizes import in_megabytes
+    from stiffdice.archive.contents import in_megabytes
     from stiffdice.errors import printable
 
-    study, root = common.study_of(options.study), Path()
-    target = pack.default_target(study, root, __version__)
+    study = common.study_of(options.study)
+    # In a folder that is no study's. WorkflowHub knows a crate by its ending, zip programs go by the last part of it.
+    target = Path("results", "archives", f"{study.name}-{__version__}.crate.zip")
     if options.output:
         target = common.target_of(options.output, options.force, _is_archive)
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
-    packed = pack.pack(study, root, target, options.agent)
+    packed = pack.pack(study, Path(), target, options.agent)
     if options.json:
         print(json.dumps({"archive": str(packed.path), "bytes": packed.size, **packed.sizes.as_data()}, indent=2))
         return
-    for line in study.left_out:
-        print(line)
-    print(packed.sizes)
-    print(printable(f"{packed.path}: {in_megabytes(packed.size)}"))
+    print("\n".join([*study.left_out, str(packed.sizes), printable(f"{packed.path}: {in_megabytes(packed.size)}")]))
 
 
 def _is_archive(path: Path) -> bool:
@@ -61,7 +59,6 @@ def _is_archive(path: Path) -> bool:
 
     from stiffdice.archive import crate
 
-    if not zipfile.is_zipfile(path):
-        return False
-    with zipfile.ZipFile(path) as archive:
+    with contextlib.suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
         return crate.NAME in archive.namelist()
+    return False

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stiffdice.errors import InputError
+from stiffdice.scene import validation
 
 if TYPE_CHECKING:
     from stiffdice.study.config import Study
@@ -21,15 +22,11 @@ _WHOLE = 1e-12
 
 def whole(option: str, text: str) -> int:
     """Return the whole number in an option's text; 1e5 counts as one."""
-    from stiffdice.scene import validation
-
     return validation.count(option, _value(text))
 
 
 def number(option: str, text: str, unit: str, *, above: float | None = None) -> float:
     """Return the number in an option's text, which may have a unit; unit: that of the result, `1` if it has none."""
-    from stiffdice.scene import validation
-
     return validation.number(option, _value(text), unit, above=above)
 
 
@@ -45,8 +42,6 @@ def steps_of(text: str, duration: float) -> tuple[int, str]:
 
     Nothing is said where the duration is a whole number of them, to rounding.
     """
-    from stiffdice.scene import validation
-
     asked = number("--dt", text, "s", above=0)
     ratio = duration / asked
     if not ratio <= validation.LARGEST_COUNT:
@@ -61,14 +56,9 @@ def steps_of(text: str, duration: float) -> tuple[int, str]:
 def add_changes(command: argparse.ArgumentParser) -> None:
     """Add the options that change a scene, the same for all commands that take one."""
     command.add_argument("--preset", metavar="P", help="as_listed, as_written or corrected: defaults of the physics")
+    told = "set one key of the scene; may be given more than once"
     command.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY.PATH=VALUE",
-        type=_change,
-        help="set one key of the scene; may be given more than once",
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.PATH=VALUE", type=_change, help=told
     )
 
 
@@ -111,10 +101,8 @@ def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources:
     from stiffdice.io.writer import check_target
 
     target = check_target(text)
-    if not target.exists():
-        return target
-    if any(target.samefile(source) for source in sources):
+    if target.exists() and any(target.samefile(source) for source in sources):
         raise InputError(f"{target}: is the scene itself; name another file for the output")
-    if force or target.stat().st_size == 0 or is_ours(target):
+    if force or not target.exists() or target.stat().st_size == 0 or is_ours(target):
         return target
     raise InputError(f"{target}: is there already, and no such file of stiffdice; name another, or add --force")

@@ -30,7 +30,7 @@ def add(diff: argparse.ArgumentParser) -> None:
 
 def call(options: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
-    from stiffdice.archive.compare.compare import compare
+    from stiffdice.archive.compare import compare
 
     found = compare(options.a, options.b, all_files=options.all)
     print(found.as_json() if options.json else "\n".join(found.lines()))

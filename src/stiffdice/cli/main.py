@@ -77,21 +77,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def called(options: argparse.Namespace) -> int:
     """Call what the parsed options name with them, and return its exit status; errors are one line."""
+    status = 2
     try:
-        status: int | None = options.call(options)
+        return int(options.call(options) or 0)
     except StiffdiceError as error:
-        print(f"stiffdice: {error}", file=sys.stderr)
-        return 2
+        told = str(error)
     except KeyboardInterrupt:
-        print("stiffdice: interrupted; nothing was stored", file=sys.stderr)
-        return 130
+        told, status = "interrupted; nothing was stored", 130
     except BrokenPipeError:  # as in `stiffdice inspect FILE | head`
         sys.stderr.close()
         return 0
     except MemoryError:
-        print("stiffdice: not enough memory; keep fewer samples with a larger --every", file=sys.stderr)
-        return 2
+        told = "not enough memory; keep fewer samples with a larger --every"
     except OSError as error:  # no room for the compiled kernel, say
-        print(f"stiffdice: {printable(error)}", file=sys.stderr)
-        return 2
-    return status or 0
+        told = printable(error)
+    print(f"stiffdice: {told}", file=sys.stderr)
+    return status

@@ -21,12 +21,11 @@ class _Line:
 
     def say(self, text: str) -> None:
         self.is_shown = True
-        start, end = ("\r\x1b[K", "") if self.is_terminal else ("", "\n")
-        print(f"{start}{text}", end=end, file=sys.stderr, flush=True)
+        print(f"\r\x1b[K{text}" if self.is_terminal else f"{text}\n", end="", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self.is_shown and self.is_terminal:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            self.say("")
 
 
 @contextmanager

@@ -38,9 +38,8 @@ def add(rebuild: argparse.ArgumentParser) -> None:
     rebuild.add_argument("-o", "--output", metavar="FOLDER", help="run it in this new folder, and leave it there")
     rebuild.add_argument("--cores", default="1", metavar="N", help="jobs at once (default: 1)")
     rebuild.add_argument("--yes", action="store_true", help="run the archive's own code without asking")
-    rebuild.add_argument(
-        "--no-sandbox", action="store_true", help="without a sandbox: its code can read and change all that you can"
-    )
+    told = "without a sandbox: its code can read and change all that you can"
+    rebuild.add_argument("--no-sandbox", action="store_true", help=told)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -79,16 +78,16 @@ def _ask(unpacked: Opened, way: Way) -> None:
 @contextmanager
 def _told_to_stop() -> Iterator[None]:
     """Clean up when told to stop: end what runs, remove what is temporary; the exit status is 128 and the signal's."""
+
+    def stop(number: int, frame: FrameType | None) -> NoReturn:
+        for other in _SIGNALS:
+            signal.signal(other, signal.SIG_IGN)
+        sys.exit(128 + number)
+
     heard = [number for number in _SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, _stop) for number in heard}
+    before = {number: signal.signal(number, stop) for number in heard}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    for other in _SIGNALS:
-        signal.signal(other, signal.SIG_IGN)
-    sys.exit(128 + number)

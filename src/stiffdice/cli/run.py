@@ -44,9 +44,8 @@ def add(run: argparse.ArgumentParser) -> None:
         "a run that needs more is stored as undecided"
     )
     run.add_argument("--budget", metavar="N", help=told)
-    run.add_argument(
-        "--ledger", action="store_true", help="book where the energy goes, bounce by bounce (takes longer)"
-    )
+    told = "book where the energy goes, bounce by bounce (takes longer)"
+    run.add_argument("--ledger", action="store_true", help=told)
     run.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
     common.add_changes(run)
 

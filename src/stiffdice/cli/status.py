@@ -72,20 +72,20 @@ def _found(options: argparse.Namespace) -> list[Status]:
 
 
 def _tell(found: list[Status], options: argparse.Namespace) -> None:
-    from stiffdice.study import status_report
+    from stiffdice.study.status import as_data, as_line, as_text
 
     if options.watch and sys.stdout.isatty():
         print("\x1b[H\x1b[J", end="")
     elif options.watch and not options.json:
         print()
     if options.json:
-        data = [status_report.as_data(status) for status in found]
+        data = [as_data(status) for status in found]
         indent = None if options.watch else 2  # a line for each look
         print(json.dumps(data if options.study is None else data[0], indent=indent), flush=True)
     elif options.study is not None:
-        print(status_report.as_text(found[0]), flush=True)
+        print(as_text(found[0]), flush=True)
     else:
-        lines = [status_report.as_line(status) for status in found]
+        lines = [as_line(status) for status in found]
         print("\n".join(lines or ["no study has results yet; `make study STUDY=quick` makes some"]), flush=True)
 
 
@@ -93,6 +93,4 @@ def _exit_status(found: list[Status]) -> int:
     from stiffdice.study.status import State
 
     states = {status.state for status in found}
-    if State.FAILED in states:
-        return 1
-    return 0 if states == {State.DONE} else 3
+    return 1 if State.FAILED in states else 0 if states == {State.DONE} else 3

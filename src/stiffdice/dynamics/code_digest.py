@@ -1,7 +1,5 @@
 """What code made a result: a digest of the sources that a module stands on."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from functools import cache
@@ -19,23 +17,17 @@ def code_digest(*modules: str) -> str:
     the change touched is computed again.
     """
     digest = hashlib.sha256()
-    sources = _closure([_path(name) for name in modules])
+    sources, waiting = set(), [_path(name) for name in modules]
+    while waiting:
+        path = waiting.pop()
+        if path and path not in sources:
+            sources.add(path)
+            waiting += map(_path, _imports(path))
     scripts = {path.with_suffix(".m") for path in sources}
     for path in sorted(sources | {path for path in scripts if path.is_file()}):
         digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0")
         digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def _closure(paths: list[Path | None]) -> set[Path]:
-    found: set[Path] = set()
-    waiting = [path for path in paths if path]
-    while waiting:
-        path = waiting.pop()
-        if path not in found:
-            found.add(path)
-            waiting += [part for part in map(_path, _imports(path)) if part]
-    return found
 
 
 @cache
@@ -56,7 +48,4 @@ def _imports(path: Path) -> set[str]:
 def _path(name: str) -> Path | None:
     """Return the source file of a dotted name, or None if it is an object inside a module."""
     base = PACKAGE.joinpath(*name.split(".")[1:])
-    for path in (base.with_suffix(".py"), base / "__init__.py"):
-        if path.is_file():
-            return path
-    return None
+    return next((path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file()), None)

@@ -2,46 +2,52 @@
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
-versions that compile them. What is in it is digested, too, and known by the processor it is for (`kernel_cache`).
+versions that compile them. Each file in it begins with its own digest, and is known by the processor that it is for;
+what does not match is compiled again.
 """
 
-from __future__ import annotations
-
+import contextlib
 import gc
 import hashlib
 import inspect
 import os
+import pickle
+import shutil
 import stat
 import tempfile
-from collections.abc import Callable
-from functools import cache
+import uuid
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numba
+from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, serialize, typed_passes
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.errors import OutputError
-
-_BLOCK = 4096  # bytes: a full disk has not one
 
 
 def _cache_folder() -> Path:
     parts = [code_digest("stiffdice.simulation.run"), version("numba"), version("numpy"), version("llvmlite")]
     name = "kernels-" + hashlib.sha256(" ".join(parts).encode()).hexdigest()[:16]
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    fallback = _temporary() / f"stiffdice-{os.getuid()}"
     try:
         home = Path(base) if base else Path("~/.cache").expanduser()
     except RuntimeError:  # a user without a home
-        home = fallback
+        home = Path("/tmp")
     if home.name.startswith("kernels-") and home.parent.name == "stiffdice":
         home = home.parent.parent  # a parent process set it to its own folder
-    for parent in (home / "stiffdice", fallback):
-        try:
-            if _is_made(parent) and _is_made(parent / name) and _has_room(parent / name):
-                return parent / name
-        except OSError:
-            continue
+    for place in (home, None):
+        with contextlib.suppress(OSError):
+            folder = (place / "stiffdice" if place else Path(tempfile.gettempdir(), f"stiffdice-{os.getuid()}")) / name
+            if _is_made(folder.parent) and _is_made(folder):
+                with tempfile.TemporaryFile(dir=folder) as file:
+                    file.write(bytes(4096))  # on a full disk numba would fail, at the end of compiling
+                return folder
     try:
         return Path(tempfile.mkdtemp(prefix="stiffdice-"))
     except OSError as error:
@@ -58,34 +64,102 @@ def _is_made(folder: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & stat.S_IWOTH
 
 
-def _has_room(folder: Path) -> bool:
-    """Return whether files can be written there: numba does not ask, and fails at the end of compiling."""
+# In the environment for child processes and for numba to find when it reads it again.
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())
+setattr(numba.config, "CACHE_DIR", os.environ["NUMBA_CACHE_DIR"])  # noqa: B010 (mypy knows no such attribute)
+
+_DIGEST = hashlib.sha256().digest_size
+_LOADING: ContextVar[bool] = ContextVar("_LOADING", default=False)
+
+
+class NotStoredError(Exception):
+    """A kernel is not on disk, and is not to be compiled now."""
+
+
+@contextlib.contextmanager
+def only_stored() -> Iterator[None]:
+    """Raise NotStoredError where the block would have to compile a kernel."""
+    token = _LOADING.set(True)
     try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(_BLOCK))
-    except OSError:
-        return False
-    return True
+        yield
+    finally:
+        _LOADING.reset(token)
 
 
-def _temporary() -> Path:
-    try:
-        return Path(tempfile.gettempdir())
-    except OSError:  # there is none that can be written
-        return Path("/tmp")
+class KernelFiles:
+    """The kernels of one function, a file for each signature and processor: SHA-256, then key and kernel, pickled.
+
+    Numba's own files know no damage; and two processes that compile two signatures at once may give both the same
+    number. folder: where they lie. name: of the function. stamp: of its source; part of every key.
+    """
+
+    def __init__(self, folder: Path, name: str, stamp: object) -> None:
+        self._folder, self._name, self._stamp = folder, name, stamp
+
+    def path(self, key: object) -> Path:
+        """Return where the kernel of a key is kept."""
+        name = hashlib.sha256(repr((self._stamp, key)).encode()).hexdigest()[:16]
+        return self._folder / f"{self._name}.{name}.nbc"
+
+    def load(self, key: object) -> Any:
+        """Return the kernel of a key; None if there is none, or a damaged one. Nothing damaged is unpickled."""
+        try:
+            content = memoryview(self.path(key).read_bytes())
+        except OSError:
+            return None
+        if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
+            return None
+        saved, kernel = pickle.loads(content[_DIGEST:])
+        return kernel if saved == (self._stamp, key) else None
+
+    def save(self, key: object, kernel: Any) -> None:
+        """Keep the kernel of a key in place of whatever is there; raises OSError if it cannot be stored."""
+        path, content = self.path(key), serialize.dumps(((self._stamp, key), kernel))  # type: ignore[no-untyped-call]
+        part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
+        if path.is_dir():
+            shutil.rmtree(path)
+        try:
+            part.write_bytes(hashlib.sha256(content).digest() + content)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
 
 
-# In the environment for child processes and for numba to find when it reads it again; in its configuration in case
-# that somebody imported numba before.
-_FOLDER = str(_cache_folder())
-os.environ["NUMBA_CACHE_DIR"] = _FOLDER
+class _Locator(UserProvidedCacheLocator):
+    """The folder chosen above, and no other: the others that numba tries would serve stale kernels."""
 
-import numba  # noqa: E402
-from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, typed_passes  # noqa: E402
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
+        return cls(py_func, py_file)
 
-from stiffdice.dynamics.kernel_cache import KernelCache  # noqa: E402
 
-setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
+class _Implementation(CompileResultCacheImpl):
+    _locator_classes = [_Locator]  # noqa: RUF012 (as numba has it)
+
+
+class _KernelCache(FunctionCache):
+    """Numba's cache of a function, with files of our own."""
+
+    _impl_class = _Implementation
+    _cache_file: Any
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        locator = self._impl.locator
+        folder, stamp = Path(locator.get_cache_path()), locator.get_source_stamp()
+        self._cache_file = KernelFiles(folder, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is stored, None if that is nothing; raises NotStoredError for nothing in `only_stored`."""
+        found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        if found is None and _LOADING.get():
+            raise NotStoredError
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled; where it cannot be stored, it serves this process alone."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
 # Of these numba has no types.
@@ -179,14 +253,17 @@ def _callable(part: _Part) -> Any:
     return numba.njit(call, error_model="numpy", fastmath=False)
 
 
-def njit(*function: Any, **options: Any) -> Any:
+def njit(function: Any = None, **options: Any) -> Any:
     """Compile a function as numba's decorator does, with division by zero giving infinity or not-a-number.
 
     At the extremes a step, a stiffness or a weight may leave the range of doubles; that is a result, not an error.
     Arithmetic is as written unless `fastmath` is asked for here: left unsaid, numba takes it from whoever happens to
     call the function first. What is not kept in the cache on disk is a part of what is, and compiled as such.
     """
+    if function is None:
+        return partial(njit, **options)
     options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
+<<<<<<< HEAD
     cached = options.pop("cache", False)
 
     def compiled(python: Callable[..., Any]) -> Any:
@@ -198,16 +275,19 @@ def njit(*function: Any, **options: Any) -> Any:
         return kernel
 
     return compiled(*function) if function else compiled
+=======
+    if not options.pop("cache", False):
+        bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return _Part(function, targetoptions=bare, pipeline_class=_PartCompiler)
+    kernel = _Kernel(function, targetoptions=options)
+    kernel._cache = _KernelCache(function)
+    return kernel
+>>>>>>> house
 
 
 def constant(value: Any) -> Any:
     """Return a function, for compiled code only, that returns a value whatever its arguments."""
-
-    @njit
-    def body(*arguments: Any) -> Any:
-        return value
-
-    return body
+    return njit(lambda *arguments: value)
 
 
 class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]

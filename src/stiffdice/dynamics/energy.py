@@ -1,7 +1,5 @@
 """Energies of a state, for the time loop and for stored trajectories alike."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -57,13 +55,12 @@ def elastic(physics: Physics, state: Any) -> float:
 @njit(cache=True)
 def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
     """Return kinetic, potential and elastic energy [J] of each state, shape (state,) each."""
-    count = states.shape[0]
-    result = np.empty(count), np.empty(count), np.empty(count)
+    count = len(states)
+    moving, high, pressed = np.empty(count), np.empty(count), np.empty(count)
     for k in range(count):
-        result[0][k] = kinetic(physics, states[k])
-        result[1][k] = potential(physics, states[k])
-        result[2][k] = elastic(physics, states[k])
-    return result
+        state = states[k]
+        moving[k], high[k], pressed[k] = kinetic(physics, state), potential(physics, state), elastic(physics, state)
+    return moving, high, pressed
 
 
 @njit(cache=True)

@@ -15,8 +15,6 @@ the ground keeps the cube: should the force come back before the surface is reac
 2ζb that it takes to bring it to zero again, and what is left of the motion lacks the energy to get out.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -25,8 +23,6 @@ from stiffdice.dynamics.state import Physics, physics_of
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-
-DEAD = 1e150  # past this damping ratio squares leave the range of doubles, and next to none of the speed is left
 
 
 @njit
@@ -45,24 +41,16 @@ def rebound_speed(physics: Physics, pull: float, speed_in: float) -> float:
     zeta = physics.damping / math.sqrt(physics.stiffness) / math.sqrt(physics.mass)
     if zeta == 0.0:
         return speed_in
-    if zeta > DEAD:
+    if zeta > 1e150:  # squares leave the range of doubles, and next to none of the speed is left
         return 0.0
-    # In units of the larger of the two speeds neither these nor their squares overflow, and the small one is precise.
+    # In units of the larger of the two speeds neither these nor their squares overflow, and the small one is precise;
+    # start and weight are a and b.
     ratio = pull / omega / speed_in
     if ratio < 1.0:
         unit, start, weight = speed_in, 1.0, ratio
     else:
         unit, start, weight = pull / omega, 1.0 / ratio, 1.0
-    square = _rebound_squared(physics.approach_damping, zeta, start, weight)
-    if square <= 0.0:
-        return 0.0
-    return min(unit * math.sqrt(square), speed_in)
-
-
-@njit
-def _rebound_squared(approach_damping: float, zeta: float, start: float, weight: float) -> float:
-    """Return the square of the speed at lift-off, not positive if there is none; start and weight are a and b."""
-    zeta_in = approach_damping * zeta
+    zeta_in = physics.approach_damping * zeta
     brake = zeta * weight
     decay_in = 2.0 * zeta_in * _duration(zeta_in, weight, start)
     # At the least u that gets out, 4ζb.
@@ -73,7 +61,8 @@ def _rebound_squared(approach_damping: float, zeta: float, start: float, weight:
     while lower < u:
         u = lower
         lower = brake + math.sqrt(brake * brake + _swing(zeta, zeta_in, start, weight, decay_in, weight, u))
-    return lower * (lower - 4.0 * brake)
+    square = lower * (lower - 4.0 * brake)
+    return 0.0 if square <= 0.0 else min(unit * math.sqrt(square), speed_in)
 
 
 @njit

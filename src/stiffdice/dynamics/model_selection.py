@@ -13,16 +13,13 @@ centre stays above the ground is righted by every contact. On an edge or a corne
 the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 
 import numpy as np
 
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.state import Array, physics_of, start_of
+from stiffdice.dynamics.state import Array, along, physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -40,8 +37,6 @@ ROUND_OFF = 1e-14
 # In units of all lengths in a flight: far above what its round-off can add up to.
 _MARGIN = 1e-9
 
-_ISOTROPY = "its inertia, the same about every axis, needs no tensor that turns with it"
-
 
 def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
     """Return the least model that is exact for a scene, and a sentence that says why.
@@ -49,8 +44,42 @@ def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
     longest_step [s]: of the runs it is for. A scheme's flight may leave the parabola by what gravity adds in a step to
     the speed, and members fly on for up to a step; only a flight that clears the ground even so is `flying`.
     """
-    name, reason = _least(scene, longest_step)
-    return name, f"{name}: {reason}" + (f"; {_ISOTROPY}" if name == "tumbling" else "")
+    ground, clear, speed = scene.ground, _clears(scene, longest_step), _along(scene, scene.launch.velocity)
+    # Exactly nothing moves it along the ground: the friction of a sliding speed of round-off is above round-off.
+    sliding = any(part - speed * along for part, along in zip(scene.launch.velocity, ground.normal, strict=True))
+    straight = not sliding and not (scene.gravity > 0 and (ground.normal[0] != 0 or ground.normal[1] != 0))
+    if ground.stiffness == 0 and ground.damping == 0:
+        name, reason = "flying", "ground without stiffness and damping does nothing to the cube"
+    elif clear and (ground.contact == "gated" or ground.damping == 0):
+        name, reason = "flying", "the cube never reaches the ground, so its weight alone moves it"
+    elif clear and _recedes(scene, longest_step):
+        name = "flying"
+        reason = "the cube never reaches the ground nor moves towards it, so its weight alone moves it"
+    elif any(scene.launch.spin):
+        name, reason = "tumbling", "the cube spins"
+    elif not clear and not lands_flat(scene):
+        name = "tumbling"
+        reason = (
+            "the cube does not land flat, and on an edge or a corner the ground turns it, from the slightest tilt if "
+            "it is balanced"
+        )
+    elif not clear and ground.friction > 0 and not straight:
+        name, reason = "tumbling", "the cube lands flat, but friction tips it as it slides"
+    elif not clear and not _stays_above(scene):
+        name, reason = "tumbling", "the cube lands flat, but may sink to its centre, past which the ground turns it"
+        reason += " from the slightest tilt"
+    else:
+        level = straight and ground.normal == (0.0, 0.0, 1.0)
+        name, aside = ("vertical", "sideways") if level else ("sliding", "along the ground")
+        if clear:
+            reason = "the cube never reaches the ground, and drag, the same on every node, gives it no spin"
+            reason += f", nor does anything move it {aside}" if straight else ""
+        else:
+            reason = "the cube lands flat without spin and "
+            reason += f"nothing moves it {aside}" if straight else "there is no friction to tip it"
+    if name == "tumbling":
+        reason += "; its inertia, the same about every axis, needs no tensor that turns with it"
+    return name, f"{name}: {reason}"
 
 
 def chosen(model: str, scenes: Iterable[Scene], longest_step: float) -> tuple[str, str]:
@@ -71,57 +100,6 @@ def chosen(model: str, scenes: Iterable[Scene], longest_step: float) -> tuple[st
             f"{longest_step:.3g} s; this one requires {needed[1]}"
         )
     return model, AS_ASKED
-
-
-def _least(scene: Scene, longest_step: float) -> tuple[str, str]:
-    clear = _clears(scene, longest_step)
-    unfelt = _why_no_contact(scene, clear, longest_step)
-    if unfelt:
-        return "flying", unfelt
-    straight = _moves_straight(scene)
-    turned = _why_rotation(scene, clear, straight)
-    if turned:
-        return "tumbling", turned
-    if not straight:
-        return "sliding", _DRAGGED if clear else "the cube lands flat without spin and there is no friction to tip it"
-    level = scene.ground.normal == (0.0, 0.0, 1.0)
-    lesser, aside = ("vertical", "sideways") if level else ("sliding", "along the ground")
-    if clear:
-        return lesser, f"{_DRAGGED}, nor does anything move it {aside}"
-    return lesser, f"the cube lands flat without spin and nothing moves it {aside}"
-
-
-_DRAGGED = "the cube never reaches the ground, and drag, the same on every node, gives it no spin"
-
-
-def _why_no_contact(scene: Scene, clear: bool, longest_step: float) -> str:
-    """Return why the ground does nothing to the cube, or nothing if it may."""
-    ground = scene.ground
-    if ground.stiffness == 0 and ground.damping == 0:
-        return "ground without stiffness and damping does nothing to the cube"
-    if clear and (ground.contact == "gated" or ground.damping == 0):
-        return "the cube never reaches the ground, so its weight alone moves it"
-    if clear and _recedes(scene, longest_step):
-        return "the cube never reaches the ground nor moves towards it, so its weight alone moves it"
-    return ""
-
-
-def _why_rotation(scene: Scene, clear: bool, straight: bool) -> str:
-    """Return what turns a cube on which the ground acts, or nothing if nothing does."""
-    if any(scene.launch.spin):
-        return "the cube spins"
-    if clear:
-        return ""
-    if not lands_flat(scene):
-        return (
-            "the cube does not land flat, and on an edge or a corner the ground turns it, from the slightest tilt if "
-            "it is balanced"
-        )
-    if scene.ground.friction > 0 and not straight:
-        return "the cube lands flat, but friction tips it as it slides"
-    if not _stays_above(scene):
-        return "the cube lands flat, but may sink to its centre, past which the ground turns it from the slightest tilt"
-    return ""
 
 
 def lands_flat(scene: Scene, tolerance: float = ROUND_OFF) -> bool:
@@ -148,10 +126,8 @@ def _clears(scene: Scene, longest_step: float) -> bool:
     height, speed = _along(scene, scene.launch.position), _along(scene, scene.launch.velocity)
     pull, time = scene.gravity * scene.ground.normal[2], scene.duration + longest_step
     slow = speed - abs(pull) * longest_step
-    ends = [time]
-    if pull < 0 and 0 < slow / pull < time:
-        ends.append(slow / pull)
-    lowest = min([height, *(height + slow * end - pull * end * end / 2 for end in ends)])
+    turn = min(max(0.0, slow / pull), time) if pull < 0 else time
+    lowest = min([height, *(height + slow * end - pull * end * end / 2 for end in (turn, time))])
     extent = physics_of(scene).reach if any(scene.launch.spin) else -float(_heights(scene).min())
     margin = _MARGIN * (extent + abs(height) + abs(slow) * time + abs(pull) * time * time)
     return lowest > extent + margin
@@ -165,17 +141,6 @@ def _recedes(scene: Scene, longest_step: float) -> bool:
     # Along the normal n a node at r moves by n·(ω × r) = r·(n × ω).
     turning = math.hypot(*np.cross(scene.ground.normal, spin).tolist()) / physics.inertia * physics.reach
     return slowest >= turning
-
-
-def _moves_straight(scene: Scene) -> bool:
-    """Return whether nothing ever moves a cube without spin along the ground: no velocity, and no part of gravity.
-
-    Exactly nothing: the friction of a sliding speed of round-off is that over the cutoff, and above round-off.
-    """
-    normal, speed = scene.ground.normal, _along(scene, scene.launch.velocity)
-    sliding = any(part - speed * along for part, along in zip(scene.launch.velocity, normal, strict=True))
-    sloping = scene.gravity > 0 and (normal[0] != 0 or normal[1] != 0)
-    return not sliding and not sloping
 
 
 def _stays_above(scene: Scene) -> bool:

@@ -9,8 +9,6 @@ In compiled code only: `load`, `store`, `where`, `bits`; `+ − * /`, comparison
 `& | ^ ~`, `abs`, `max`, `math.sqrt`. A comparison gives a mask.
 """
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable
@@ -18,7 +16,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils as _cgutils
 from numba.core.typing.templates import AbstractTemplate
 from numba.core.typing.templates import infer_global as _infer_global
 from numba.extending import intrinsic as _intrinsic
@@ -29,7 +26,6 @@ from numba.extending import models, register_model
 infer_global: Any = _infer_global
 intrinsic: Any = _intrinsic
 lower_builtin: Any = _lower_builtin
-cgutils: Any = _cgutils
 
 _DOUBLE = ir.DoubleType()
 
@@ -105,9 +101,8 @@ def _call(name: str) -> Callable[..., Any]:
 
     def build(builder: Any, vector: Any) -> Any:
         kind = ir.FunctionType(vector.type, [vector.type])
-        return builder.call(
-            cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{vector.type.count}f64"), [vector]
-        )
+        whole = f"llvm.{name}.v{vector.type.count}f64"
+        return builder.call(builder.module.declare_intrinsic(whole, (), kind), [vector])
 
     return build
 

@@ -1,13 +1,12 @@
-"""What a kernel works on: the state of one rigid body, and the physics it moves in."""
+"""What a kernel works on: the state of one rigid body, and the physics it moves in; and rotations of nodes."""
 
-from __future__ import annotations
-
+import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.rotation import rotated
 from stiffdice.errors import InputError
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.flat_landing import CONTACT_LAWS
@@ -90,7 +89,12 @@ def start_of(scene: Scene, model: str) -> States:
     state["position"] = launch.position
     state["velocity"] = launch.velocity
     if model == "vertical":
-        _check_level(scene)
+        if scene.ground.normal != (0.0, 0.0, 1.0):
+            normal = ", ".join(f"{part:g}" for part in scene.ground.normal)
+            raise InputError(
+                f"model = vertical: ground.normal = [{normal}]; allowed is level ground, [0, 0, 1], as the model moves "
+                "the cube up and down only"
+            )
         state["velocity"][:, :2] = 0.0
     if model in TURNING:
         state["angular_momentum"] = launch.spin
@@ -100,17 +104,35 @@ def start_of(scene: Scene, model: str) -> States:
     return state
 
 
-def _check_level(scene: Scene) -> None:
-    if scene.ground.normal != (0.0, 0.0, 1.0):
-        normal = ", ".join(f"{part:g}" for part in scene.ground.normal)
-        raise InputError(
-            f"model = vertical: ground.normal = [{normal}]; allowed is level ground, [0, 0, 1], as the model moves the "
-            "cube up and down only"
-        )
-
-
 class Ensemble(NamedTuple):
     """The launches of members, and how late [s] each enters the scene's flight; shape (member,) each."""
 
     launches: States
     late: Array
+
+
+def along(vectors: Array, direction: Sequence[float] | Array) -> Array:
+    """Return the components of vectors, shape (..., 3), in a direction; BLAS has other digits on other processors."""
+    x, y, z = direction
+    return np.asarray(vectors[..., 0] * x + vectors[..., 1] * y + vectors[..., 2] * z)
+
+
+def rotated(offsets: Array, rotation: Array) -> Array:
+    """Return offsets, shape (node, 3), turned by a rotation vector [rad] (Rodrigues' formula, equation 9)."""
+    angle = math.hypot(*rotation)
+    if angle == 0:
+        return offsets.copy()
+    axis = rotation / angle
+    parallel = np.outer(along(offsets, axis), axis)
+    return np.asarray(parallel + math.cos(angle) * (offsets - parallel) + math.sin(angle) * np.cross(axis, offsets))
+
+
+def matrices(quaternions: Array) -> Array:
+    """Return rotation matrices, shape (K, 3, 3), of unit quaternions (w, x, y, z), shape (K, 4)."""
+    w, x, y, z = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)

@@ -35,7 +35,7 @@ from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Launch, Scene
 from stiffdice.simulation import dataset
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 FLAT_MODEL = "sliding"
 # The paper's scheme, the one that is like what engines do to contacts, and the engines that are always there.
@@ -87,7 +87,7 @@ def limits(
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     special = [linear_theory.magic_step(n) for n in np.arange(1.5, _MAGIC + 1, 0.5)]
     values = scan(*span(omega_h), validation.count("count", count, at_least=2), special).tolist()
     phase = np.arange(validation.count("phases", phases)) / phases
@@ -106,7 +106,7 @@ def limits(
     dimensions, outcome, _ = found["outcome"]
     found["outcome"] = dimensions, outcome.astype(np.int8), enum_attributes("what becomes of the cube", OUTCOMES)
     found["exact_restitution"] = quantity((), flat_bounce.restitution(smooth, speed), "exact restitution")
-    told = stepper.attributes(names) | {"scene_note": "ground: level, gated, without friction; an upright cube"}
+    told = engines.attributes(names) | {"scene_note": "ground: level, gated, without friction; an upright cube"}
     return result(found, "The longest steps", scene, FLAT_MODEL, "method", __name__, **told)
 
 
@@ -127,7 +127,7 @@ def contact(
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short, or stops sliding in the bounce.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     axes = {
         "stiffness": numbers("stiffness", stiffness, "kg/s²", above=0),
         "damping": numbers("damping", damping, "kg/s", at_least=0),
@@ -151,7 +151,7 @@ def contact(
 
     found = mapped(ratios, RATIOS, method=names, **axes)
     note = "ground: level, gated, stiffness and damping as the dimensions say; an upright cube"
-    told = stepper.attributes(names) | {"scene_note": note}
+    told = engines.attributes(names) | {"scene_note": note}
     return result(found, "Contacts over the exact ones", scene, FLAT_MODEL, "method", __name__, **told)
 
 
@@ -177,7 +177,7 @@ def _heights_at_rest(method: str, scene: Scene, h: float, steps: int, nudge: flo
     launch = Launch((0.0, 0.0, height), (0.0, 0.0, 0.0), node_velocity="rigid")
     resting = dataclasses.replace(scene, launch=launch, duration=steps * h)
     states = np.zeros(steps, STATE)
-    stepper.start(method, resting, FLAT_MODEL, start_of(resting, FLAT_MODEL), h).advance(states, 1)
+    engines.adapter_of(method)(resting, FLAT_MODEL, start_of(resting, FLAT_MODEL), h).advance(states, 1)
     return np.asarray(states["position"][:, 2])
 
 
@@ -201,7 +201,7 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
     scene: of `flat`. phase [1]: how much of a step has passed when the lowest nodes meet the surface.
     """
     half, gravity, (x, y, _) = scene.cube.side / 2, scene.gravity, scene.launch.velocity
-    height, lag = speed * h * (1 + phase), stepper.lag(method) * h * gravity
+    height, lag = speed * h * (1 + phase), engines.adapter_of(method).LAG * h * gravity
     if 2 * gravity * height >= speed**2:
         raise InputError(f"omega_h: a step of {h:.3g} s is too long for a fall that ends at {speed:.3g} m/s")
     down = math.sqrt(speed**2 - 2 * gravity * height) - lag
@@ -209,7 +209,7 @@ def bounce(method: str, scene: Scene, speed: float, h: float, phase: float) -> B
     chunk = 3 + math.ceil(1.2 * (math.pi / contact_frequency(scene)) / h)
     scene = dataclasses.replace(scene, launch=placed, duration=h * (chunk * _PATIENCE))
     states, outcome = start_of(scene, FLAT_MODEL), "stays"
-    engine = stepper.start(method, scene, FLAT_MODEL, states, h)
+    engine = engines.adapter_of(method)(scene, FLAT_MODEL, states, h)
     while outcome == "stays" and len(states) <= chunk * _PATIENCE:
         more = np.zeros(chunk, STATE)
         engine.advance(more, 1)
@@ -273,19 +273,19 @@ def throw(scene: Scene, *, methods: Sequence[str] = THROWN, steps: float = 4e7, 
     """
     samples = validation.count("samples", samples)
     most = validation.number("steps", steps, "1", at_least=samples)
-    reasons = {name: stepper.unfit(name, scene, THROW_MODEL) for name in stepper.chosen_from(methods)}
+    reasons = {name: engines.adapter_of(name).unfit(scene, THROW_MODEL) for name in engines.chosen_from(methods)}
     names = [name for name, why in reasons.items() if why is None]
     if not names:
         raise InputError(f"methods: none of them can represent the scene: {'; '.join(map(str, reasons.values()))}")
 
     def path(method: str, steps: int, tolerance: float) -> tuple[Array, int]:
-        found = stepper.ready(method, scene, THROW_MODEL, steps, samples, tolerance)()()
+        found = engines.ready(method, scene, THROW_MODEL, steps, samples, tolerance)()()
         return found.states["position"], found.evaluations
 
     (reference, _), (coarser, _) = (path(REFERENCE, samples, size) for size in (_FINEST, _COARSER))
 
     def efforts(method: str) -> tuple[Any, ...]:
-        own, finest = stepper.own_steps(method), most / stepper.dearness(method)
+        own, finest = engines.METHODS[method].own_steps, most / engines.METHODS[method].dearness
         counts = [samples * max(1, round(finest / part / samples)) for part in _PARTS]
         tried = [(samples, size) for size in _TOLERANCES] if own else [(count, np.nan) for count in counts]
         places, evaluations = zip(*(path(method, *effort) for effort in tried), strict=True)
@@ -300,7 +300,7 @@ def throw(scene: Scene, *, methods: Sequence[str] = THROWN, steps: float = 4e7, 
     found["reference_position"] = quantity(("time", "axis"), reference, "centre of mass by the reference", "m")
     found["reference_error"] = quantity("time", apart, "distance of the reference from a coarser one", "m")
     unfit = "; ".join(f"{name}: {why}" for name, why in reasons.items() if why is not None)
-    told = stepper.attributes(names) | {"reference": REFERENCE, "unfit": unfit}
+    told = engines.attributes(names) | {"reference": REFERENCE, "unfit": unfit}
     return result(found, "The throw in every engine", scene, THROW_MODEL, "method", __name__, **told)
 
 
@@ -318,16 +318,16 @@ def speed(
     of each run of the scene's duration. affordable [s]: a longer run is timed once. rounds: in each every run is timed.
     Raises InputError for a number out of range, and an engine that is not installed.
     """
-    names = stepper.chosen_from(methods)
+    names = engines.chosen_from(methods)
     steps = SAMPLES * max(1, validation.count("steps", steps) // SAMPLES)
     affordable, rounds = validation.number("affordable", affordable, "s", above=0), validation.count("rounds", rounds)
     seconds, spread, taken = np.full((3, len(TIMED), len(names)), np.nan)
     for p, problem in enumerate(PROBLEMS[name] for name in TIMED):
         there = scene_of(problem, scene, scene.ground.stiffness)
-        fit = [k for k, name in enumerate(names) if stepper.unfit(name, there, problem.model) is None]
-        starts = [stepper.ready(names[k], there, problem.model, steps, SAMPLES) for k in fit]
+        fit = [k for k, name in enumerate(names) if engines.adapter_of(name).unfit(there, problem.model) is None]
+        starts = [engines.ready(names[k], there, problem.model, steps, SAMPLES) for k in fit]
         counted = [start()().evaluations for start in starts]  # what is not compiled yet is now
-        taken[p, fit] = np.where([stepper.own_steps(names[k]) for k in fit], counted, steps)
+        taken[p, fit] = np.where([engines.METHODS[names[k]].own_steps for k in fit], counted, steps)
         seconds[p, fit], spread[p, fit] = interleaved(starts, rounds, affordable)
     grid = ("problem", "method")
     variables = coordinates(problem=TIMED, method=names) | {
@@ -335,5 +335,5 @@ def speed(
         "spread": quantity(grid, spread, "half the range between the quartiles of the times over their median"),
         "taken": quantity(grid, taken, "steps of the run; force evaluations of one that takes its own steps"),
     }
-    told = stepper.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
+    told = engines.attributes(names) | machine() | {"steps": steps, "samples": SAMPLES, "rounds": rounds}
     return result(variables, "Steps a second", scene, "problem", "method", __name__, **told)

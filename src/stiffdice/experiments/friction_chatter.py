@@ -20,7 +20,7 @@ from stiffdice.experiments.measuring import mapped, numbers, result
 from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
 
@@ -71,7 +71,7 @@ def measure(
         sliding = relaunched(
             STARTS["at_rest"](flat.with_ground(friction=mu)), velocity=(3 * mu * scene.gravity * h, 0.0, 0.0)
         )
-        start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * taken), MODEL, taken, taken)
+        start = engines.ready(SCHEME, dataclasses.replace(sliding, duration=h * taken), MODEL, taken, taken)
         return np.abs(start()().states["velocity"][-_LAST:, 0]).max(), max(0.0, mu * scene.gravity * h / 2 - cutoff)
 
     found = mapped(swings, _SWINGS, friction=coefficients, step_size=sizes)

@@ -20,7 +20,7 @@ from stiffdice.experiments.placement import relaunched
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.initial_conditions import turned
 
 MODEL, SCHEME = "tumbling", "event"
@@ -69,7 +69,9 @@ def measure(
 
         def path(method: str, size: float) -> tuple[Array, int]:
             states = np.zeros(SAMPLES, STATE)
-            evaluations = stepper.start(method, rough, MODEL, start, scene.duration / SAMPLES, size).advance(states, 1)
+            evaluations = engines.adapter_of(method)(rough, MODEL, start, scene.duration / SAMPLES, size).advance(
+                states, 1
+            )
             return states["position"], evaluations
 
         right, reference = path("scipy", _REFERENCE)

@@ -28,7 +28,7 @@ from stiffdice.experiments.timing import seconds_of
 from stiffdice.scene import validation
 from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import Trajectory, simulate
 
 MODEL, SCHEME = "tumbling", "event"
@@ -209,7 +209,7 @@ def _starts(scene: Scene, model: str, steps: int) -> list[Callable[[], Callable[
         tensor, h = scene.cube.moment_of_inertia * np.eye(3), scene.duration / steps
         return [lambda: partial(take, start_of(scene, MODEL), tensor.copy(), h, steps)]
     plain = partial(simulate, scene, model=model, scheme=TIMED_SCHEME, steps=steps)
-    return [stepper.ready(TIMED_SCHEME, scene, model, steps, 1), lambda: partial(plain, every=steps), lambda: plain]
+    return [engines.ready(TIMED_SCHEME, scene, model, steps, 1), lambda: partial(plain, every=steps), lambda: plain]
 
 
 class _Rows(NamedTuple):

@@ -17,8 +17,7 @@ import xarray as xr
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import STATE, Array, physics_of
+from stiffdice.dynamics.state import STATE, Array, physics_of, rotated
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers, result
 from stiffdice.experiments.placement import level
@@ -26,8 +25,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation import fixed_step
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
 _TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL]
@@ -154,7 +152,7 @@ def _linearised(scene: Scene, offsets: Array) -> Callable[[float, float], Array]
     def step(damping: float, h: float) -> Array:
         physics = physics_of(scene.with_ground(damping=damping))
         for pair in states:
-            fixed_step.advance(*_TAGS, physics, pair, 1, h, schemes.TOLERANCE)
+            schemes.advance(*_TAGS, physics, pair, 1, h, schemes.TOLERANCE)
         after = states[:, 1]
         rates = [after["velocity"][:, 2] * mass, after["angular_momentum"] / inertia]
         turned = _rotation(offsets, after["node_offset"]) * inertia
@@ -221,7 +219,7 @@ def _growth(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     launch = Launch(position=(0.0, 0.0, half - sag + lift), velocity=(0.0, 0.0, 0.0), orientation=(tip, 0.0, 0.0))
     damped = scene.with_ground(damping=2 * zeta * omega * scene.ground.stiffness / mode.predicted)
     nudged = dataclasses.replace(damped, launch=launch, duration=h * steps)
-    state, upright = stepper.ready(SCHEME, nudged, MODEL, steps, steps)()().states, scene.cube.node_offsets()
+    state, upright = engines.ready(SCHEME, nudged, MODEL, steps, steps)()().states, scene.cube.node_offsets()
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
     small = np.abs(heights + sag).max(axis=1) <= _FOLLOWED * sag

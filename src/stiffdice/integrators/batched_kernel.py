@@ -11,8 +11,6 @@ They agree with the listings' order (`symplectic_euler.py`) to round-off, not to
 order.
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple
@@ -24,9 +22,8 @@ from stiffdice.dynamics.contact import push
 from stiffdice.dynamics.models.sliding import Sliding
 from stiffdice.dynamics.models.tumbling import Tumbling
 from stiffdice.dynamics.models.vertical import Vertical
-from stiffdice.dynamics.rotation import along
 from stiffdice.dynamics.simd import where
-from stiffdice.dynamics.state import TURNING, Array, Physics, States
+from stiffdice.dynamics.state import TURNING, Array, Physics, States, along
 from stiffdice.dynamics.vector import Vector, cross, dot, inlined, minus, norm, plus, plus_times, times
 from stiffdice.integrators.member_block import EDGES, ROWS, SPIN, Body, member, put
 from stiffdice.scene.cube import SIGNS
@@ -232,13 +229,9 @@ def numbers_of(physics: Physics, axes: Array, h: float) -> Numbers:
     return Numbers(h, physics.stiffness, physics.damping, physics.onset, slip, cutoff, per_mass, per_inertia, gain)
 
 
-def flat(scene: Scene, launches: States) -> bool:
-    """Return whether all members stand on a face, to round-off."""
+def posture_of(scene: Scene, model: str, launches: States) -> Any:
+    """Return the tag of how the members stand: flat if none turns and all are on a face, to round-off."""
     edges = np.einsum("ke,mkx->mex", SIGNS, launches["node_offset"]) / len(SIGNS)
     levels = np.sort(np.abs(along(edges, scene.ground.normal)), axis=1)
-    return bool((levels[:, :2] <= 4 * np.finfo(float).eps * scene.cube.side).all())
-
-
-def posture_of(scene: Scene, model: str, launches: States) -> Any:
-    """Return the tag of how the members stand."""
-    return Flat() if model not in TURNING and flat(scene, launches) else Tilted()
+    flat = (levels[:, :2] <= 4 * np.finfo(float).eps * scene.cube.side).all()
+    return Flat() if model not in TURNING and flat else Tilted()

@@ -1,12 +1,11 @@
 """What schemes share: free flight in closed form, and sums of motions and wrenches, six numbers each."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
+from stiffdice.dynamics.models import tumbling
 from stiffdice.dynamics.state import Motion, Physics
 
 
@@ -22,7 +21,8 @@ def flight(model: Any, physics: Physics, state: Any, h: float, steps: int, lag: 
     state.position[1] += time * state.velocity[1]
     state.position[2] += time * (state.velocity[2] + fall * ((time + 2 * lag * h) / 2))
     state.velocity[2] += fall * time
-    models.turn(model, physics, state, time)
+    if models.turns(model):
+        tumbling.turn(physics, state, time)
 
 
 @njit
@@ -35,16 +35,6 @@ def landing(pull: Any, clearance: float, speed: float) -> float:
     if speed < 0.0:
         return 2 * clearance / (math.sqrt(square) - speed) if square >= 0.0 else math.inf
     return (speed + math.sqrt(square)) / pull if pull > 0.0 else math.inf
-
-
-def lagging(lag: float) -> Any:
-    """Return `flight` of schemes of one lag [steps], for compiled code."""
-
-    @njit
-    def flown(model: Any, physics: Physics, state: Any, h: float, steps: int) -> None:
-        flight(model, physics, state, h, steps, lag)
-
-    return flown
 
 
 @njit

@@ -2,8 +2,6 @@
 steps that resolve both.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache
@@ -58,21 +56,14 @@ def _nodes_of_mode(scene: Scene, model: str, *, falling: bool) -> float:
     return turning if turning > nodes * (1 + _ROUND_OFF) else nodes
 
 
-class Fewest(NamedTuple):
-    """The fewest steps [1], not rounded, that keep a run within the linear limit of its scheme; 0 where there is none.
-
-    contact: of the fastest contact mode (`hardest`). drag: of a falling cube's damping under the ungated law.
-    """
-
-    contact: float
-    drag: float
-
-
 @lru_cache(maxsize=64)  # the cells of a column share them
-def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
-    """Return the steps below which a force that a run may meet is beyond the linear limit of its scheme."""
+def fewest_steps(scene: Scene, model: str, scheme: str) -> tuple[float, float]:
+    """Return the fewest steps [1], not rounded, that keep a run within the linear limit of its scheme; 0 without one.
+
+    First of the fastest contact mode (`hardest`), then of a falling cube's damping under the ungated law.
+    """
     if model not in TOUCHING:
-        return Fewest(0.0, 0.0)
+        return 0.0, 0.0
     mass, ground = scene.cube.mass, scene.ground
     with np.errstate(all="ignore"):  # numbers of a scene may be anything
         decay = scene.duration / np.float64(2 * _OVERDAMPED * stability_limit(scheme, _OVERDAMPED))
@@ -82,7 +73,7 @@ def fewest_steps(scene: Scene, model: str, scheme: str) -> Fewest:
         else:
             contact = _nodes_of_mode(scene, model, falling=False) * ground.damping / np.float64(mass) * decay
         drag = _nodes_of_mode(scene, model, falling=True) * ground.damping / np.float64(mass) * decay
-    return Fewest(float(contact), float(drag) if ground.contact == "ungated" else 0.0)
+    return float(contact), float(drag) if ground.contact == "ungated" else 0.0
 
 
 def half_turn_steps(scene: Scene, momentum: Array) -> Array:

@@ -1,7 +1,5 @@
 """The block of memory in which the batched kernel has its members, one in each lane, along the ground's axes."""
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple
@@ -45,11 +43,7 @@ ABREAST: dict[str, Any] = {"vertical": ThirtyTwo(), "sliding": ThirtyTwo(), "tum
 
 
 def _row_of(width: int) -> Any:
-    @inlined
-    def row_of(block: Array, row: int) -> Any:
-        return load(block, row, width)
-
-    return row_of
+    return inlined(lambda block, row: load(block, row, width))
 
 
 # (width, block, row) -> a row of a block.

@@ -10,13 +10,12 @@ ended by a budget, within an interval. Work is counted, not timed: a run is the 
 apply to every scene and model also has `unfit(scene, model)`, which says why not.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
+from stiffdice.dynamics.state import Physics, States
 from stiffdice.errors import InputError
 from stiffdice.integrators import forward_euler, free_flight, implicit_euler, rk4, symplectic_euler, velocity_verlet
 from stiffdice.integrators.event_driven import scheme as event
@@ -98,8 +97,14 @@ step = _chosen(_step_of)
 # by one step, or by a part of it; `sight.pending` is what is left of it then [s], and `sight.work` what was done.
 one = _chosen(_one_of)
 
-# (scheme, model, physics, state, h, steps): take so many steps of free flight at once, as stepping would to round-off.
-flight = _chosen(lambda module: free_flight.lagging(module.LAG))
+_lag = _chosen(lambda module: constant(module.LAG))
+
+
+@njit
+def flight(scheme: Any, model: Any, physics: Any, state: Any, h: float, steps: int) -> None:
+    """Take so many steps of free flight at once, as stepping would to round-off."""
+    free_flight.flight(model, physics, state, h, steps, _lag(scheme))
+
 
 # (scheme, place, speed, h, steps, square, rate, constant) -> the change of place and the new speed after so many steps
 # at once of a point whose acceleration is constant − square·place − rate·speed, as stepping would to round-off; both
@@ -108,6 +113,18 @@ swing = _chosen(lambda module: getattr(module, "swing", constant((math.nan, math
 
 # (scheme) -> whether the bounds of `fast_forward.py`, for how long a phase lasts and what stays at rest, hold for it.
 proven = _chosen(lambda module: constant(hasattr(module, "swing")))
+
+
+@njit(cache=True)
+def advance(scheme: Any, model: Any, physics: Physics, samples: States, every: int, h: float, tolerance: float) -> int:
+    """Step from samples[0] on and keep every K-th state in the others; return how often the force was evaluated."""
+    evaluations = 0
+    for k in range(1, samples.shape[0]):
+        samples[k] = samples[k - 1]
+        state = samples[k]
+        for _ in range(every):
+            evaluations += step(scheme, model, physics, state, h, tolerance)
+    return evaluations
 
 
 def budget_of(scheme: str, steps: int) -> int:

@@ -7,8 +7,6 @@ Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). A free fli
 stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in a small step (Hairer and Wanner, II, IV.2).
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from typing import Any
 
@@ -65,7 +63,11 @@ def _advance(
 @njit
 def _slope(model: Any, physics: Physics, state: Any, taken: Motion, h: float) -> tuple[Wrench, Motion]:
     """Return the slopes of the momenta and of place and rotation vector, h [s] of `taken` from the step's begin."""
-    ux, uy, uz, wx, wy, wz = models.motion(model, physics, state)
+    ux, uy, uz = vector(state.velocity)
+    wx = wy = wz = 0.0
+    if models.turns(model):
+        lx, ly, lz = vector(state.angular_momentum)
+        wx, wy, wz = lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
     turned = times(h, vector(taken[3:]))
     a = cross(turned, Vector(wx, wy, wz))
     b = cross(turned, a)

@@ -52,10 +52,8 @@ class Spool:
                 raise self._told(error) from None
             raise
         # HDF5's own from here on: looking up the length of a dimension that grows takes h5netcdf longer than a write.
-        self._dimensions = {str(name): variable.dims for name, variable in self._pattern.variables.items()}
-        self._stored = {name: self._file[name] for name in self._dimensions}
-        growing = [self._stored[name] for name, dimensions in self._dimensions.items() if "cell" in dimensions]
-        self._growing = [self._file["cell"], *growing]
+        self._stored = {str(k): (self._file[str(k)], part.dims) for k, part in self._pattern.variables.items()}
+        self._growing = [self._file["cell"], *(stored for stored, dims in self._stored.values() if "cell" in dims)]
         return self
 
     def _create(self, netcdf: h5netcdf.File, name: str, variable: xr.Variable) -> None:
@@ -86,9 +84,9 @@ class Spool:
         """Store values by name for some cells, and of those that have members for some of them."""
         try:
             for name, value in values.items():
+                stored, dimensions = self._stored[name]
                 given = {"cell": cells, "member": members}
-                index = tuple(given.get(str(dimension), slice(None)) for dimension in self._dimensions[name])
-                self._stored[name][index] = value
+                stored[tuple(given.get(str(dimension), slice(None)) for dimension in dimensions)] = value
         except OSError as error:
             raise self._told(error) from None
 

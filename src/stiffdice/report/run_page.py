@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.state import TOUCHING, TURNING, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, along, start_of
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene

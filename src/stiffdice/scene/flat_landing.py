@@ -51,13 +51,8 @@ def duration(law: str, zeta: float) -> float:
     return leg(CONTACT_LAWS[law].approach_damping * zeta) + leg(zeta)
 
 
-def restitution(law: str, zeta: float) -> float:
-    """Return e [1], speed out over speed in. law: contact law; zeta [1]: damping ratio on the way out."""
-    return math.exp(-_loss(law, zeta))
-
-
-def _loss(law: str, zeta: float) -> float:
-    """Return −ln e."""
+def loss(law: str, zeta: float) -> float:
+    """Return −ln e [1], e speed out over speed in. law: contact law; zeta [1]: damping ratio on the way out."""
     approach = CONTACT_LAWS[law].approach_damping * zeta
     return approach * leg(approach) + zeta * leg(zeta)
 
@@ -67,7 +62,7 @@ def damping_ratio(law: str, restitution: float) -> float:
     wanted = -math.log(restitution)
     low, high = 0.0, math.exp(wanted / 2)  # −ln e >= 2 ln 2ζ, and at ζ = 1 it is two at least
     while low < (middle := low + (high - low) / 2) < high:
-        low, high = (middle, high) if _loss(law, middle) < wanted else (low, middle)
+        low, high = (middle, high) if loss(law, middle) < wanted else (low, middle)
     return high if wanted > 0 else 0.0
 
 

@@ -249,7 +249,7 @@ def changed(mapping: object, overrides: Sequence[str] = (), preset: str | None =
 def _override(data: Any, text: str) -> Any:
     """Return plain data with one `key.path=value` set; the value is read as YAML."""
     path, equals, raw = text.partition("=")
-    keys = path.strip().split(".")
+    section, *rest = keys = path.strip().split(".")
     if not equals or not all(keys):
         raise InputError(f"--set {text}: allowed is key.path=value, such as ground.stiffness=1e6")
     try:
@@ -257,20 +257,17 @@ def _override(data: Any, text: str) -> Any:
     except InputError as error:
         raise error.within(f"--set {text}") from None
     result = dict(validation.known_keys("", _given(data), _TOP_KEYS))
-    if len(keys) == 1:
-        if keys[0] in _SECTIONS:
-            validation.known_keys(keys[0], value, _KEYS[keys[0]])
-        return result | {keys[0]: value}
-    if keys[0] not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
-        known = [f"{name}.{key}" for name, section in _KEYS.items() for key in section]
+    if not rest:
+        if section in _SECTIONS:
+            validation.known_keys(section, value, _KEYS[section])
+        return result | {section: value}
+    if section not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
+        known = [f"{name}.{key}" for name, inner in _KEYS.items() for key in inner]
         raise InputError(f"--set {text}: no such key{validation.meant(path, known)}")
-    section = dict(validation.known_keys(keys[0], _given(result.get(keys[0])), _KEYS[keys[0]]))
+    given = validation.known_keys(section, _given(result.get(section)), _KEYS[section])
     if len(keys) == 3:
-        spin = section.get(keys[1])
-        section[keys[1]] = {**(spin if isinstance(spin, dict) else {}), keys[2]: value}
-    else:
-        section[keys[1]] = value
-        for other in derived_parameters.excluded(keys[0], keys[1]):
-            section.pop(other, None)
-    result[keys[0]] = section
-    return result
+        spin = given.get(rest[0])
+        value = {**(spin if isinstance(spin, dict) else {}), rest[1]: value}
+    left_out = derived_parameters.excluded(section, rest[0])
+    kept = {key: part for key, part in given.items() if key not in left_out}
+    return result | {section: kept | {rest[0]: value}}

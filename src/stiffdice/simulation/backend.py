@@ -19,7 +19,7 @@ OURS = "stiffdice"
 
 DEFAULT_SCHEME = "symplectic_euler"  # the paper's
 
-_DRIVER = "stiffdice.simulation.engines.driver"
+_DRIVER = "stiffdice.simulation.engines.registry"
 
 
 class Setup(NamedTuple):

@@ -21,15 +21,16 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.simd import bits, store, where
-from stiffdice.dynamics.state import TOUCHING, Array, Physics, States
+from stiffdice.dynamics.state import TOUCHING, Array, States
 from stiffdice.dynamics.vector import Vector, dot, inlined
 from stiffdice.integrators import batched_kernel, member_block
 from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.batched_kernel import Numbers
-from stiffdice.integrators.member_block import Alone, Body, row_of
+from stiffdice.integrators.member_block import Alone, row_of
 from stiffdice.simulation import fast_forward
+from stiffdice.simulation.criteria import energy
 from stiffdice.simulation.criteria.registry import CRITERIA, observe, open_of
-from stiffdice.simulation.reference import distance
+from stiffdice.simulation.criteria.trajectory import distance
 from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, until_kept
 
 SCHEME = "symplectic_euler"
@@ -55,13 +56,20 @@ ROWS = member_block.ROWS + 14
 _ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("trajectory")
 
 
-class Balance(NamedTuple):
-    """What energy, flights and rest are told by: m/2, 1/(2I), and along the ground's axes the weight [N].
+class Common(NamedTuple):
+    """What is the same of all members; scheme, width and posture are tags.
 
-    lagging [kg m/s] and offset [J]: what the kinetic energy lacks as the velocity lags behind the place. sag [m]:
-    as in `monitor.py`; omega [1/s]: of a bounce on four nodes.
+    Energy, flights and rest are told by m/2, 1/(2I), and along the ground's axes the weight [N]. lagging [kg m/s] and
+    offset [J]: what the kinetic energy lacks as the velocity lags behind the place. omega [1/s]: of a bounce on four
+    nodes; sag [m]: as in `monitor.py`.
     """
 
+    scheme: Any
+    width: Any
+    posture: Any
+    system: System
+    k: Numbers
+    limits: Limits
     half_mass: float
     half_per_inertia: float
     weight: Vector
@@ -69,18 +77,6 @@ class Balance(NamedTuple):
     offset: float
     omega: float
     sag: float
-
-
-class Common(NamedTuple):
-    """What is the same of all members; scheme, width and posture are tags."""
-
-    scheme: Any
-    width: Any
-    posture: Any
-    system: System
-    k: Numbers
-    e: Balance
-    limits: Limits
 
 
 @inlined
@@ -94,16 +90,9 @@ def _same(a: Vector, b: Vector) -> Any:
 
 
 @inlined
-def _energy(e: Balance, body: Body) -> Any:
-    """Return kinetic energy + m g z, the velocity at the time of the place [J]."""
-    moving = e.half_mass * dot(body.velocity, body.velocity) + e.half_per_inertia * dot(body.momentum, body.momentum)
-    return ((moving - dot(e.lagging, body.velocity)) + dot(e.weight, body.place)) + e.offset
-
-
-@inlined
 def _run_on(common: Common, block: Array) -> int:
     """Step a block until something happens to a member; return to whom, lane j as bit j."""
-    width, e = common.width, common.e
+    width = common.width
     body = member_block.read(width, block)
     done, worst, clearance = row_of(width, block, DONE), row_of(width, block, WORST), row_of(width, block, CLEARANCE)
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
@@ -111,17 +100,20 @@ def _run_on(common: Common, block: Array) -> int:
     while True:
         new = batched_kernel.step(common.system.model, common.posture, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
-        energy = _energy(e, new)
+        # Kinetic energy + m g z, the velocity at the time of the place.
+        turning = common.half_per_inertia * dot(new.momentum, new.momentum)
+        moving = common.half_mass * dot(new.velocity, new.velocity) + turning
+        total = ((moving - dot(common.lagging, new.velocity)) + dot(common.weight, new.place)) + common.offset
         up = now > 0.0
-        swing = swing_square(e.omega, common.k.h, now + e.sag, new.velocity.z)
+        swing = swing_square(common.omega, common.k.h, now + common.sag, new.velocity.z)
         settles = (swing < rest) | (_same(new.velocity, body.velocity) & (new.momentum.x == body.momentum.x))
         size = _total(new.place) + _total(new.velocity) + _total(new.momentum) + _total(new.a)
         unturned = batched_kernel.unturned(common.k, new)
-        happens = (up ^ (clearance > 0.0)) | (up & (energy > limit)) | (~up & settles)
+        happens = (up ^ (clearance > 0.0)) | (up & (total > limit)) | (~up & settles)
         happens = happens | ~(size < math.inf) | unturned
         happening = bits(live & (happens | (done >= due)))
         done = done + 1.0
-        flying = where(up, max(worst, energy), worst)
+        flying = where(up, max(worst, total), worst)
         if happening != 0:
             member_block.write(block, new)
             still = _same(new.velocity, body.velocity) & _same(new.place, body.place) & _same(new.a, body.a)
@@ -137,16 +129,6 @@ def _run_on(common: Common, block: Array) -> int:
             store(block, BEFORE, clearance)
             return happening
         body, clearance, worst, earlier = new, now, flying, body.velocity.z
-
-
-@njit
-def _show(common: Common, member: Member, samples: States, step: int, flown: int) -> bool:
-    """Show a step to all who watch, and keep it; return whether every number is in range."""
-    observe(common.system, member, step, flown)
-    if member.memory.finite[0] > 0.0:
-        return False
-    keep(common.limits, samples, member.state, step)
-    return True
 
 
 @njit
@@ -167,25 +149,22 @@ def _only_compared(common: Common, axes: Array, block: Array, lane: int, member:
 
 
 @njit
-def _lies(sight: Any, memory: Any) -> bool:
-    """Return whether the cube has never left the ground, and goes on moving."""
-    return memory.energy[3] > 0.0 and sight.still == 0.0
-
-
-@njit
 def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Member, samples: States, done: int) -> int:
     """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
     state, sight, memory, _ = member
     member_block.leave(common.system.model, axes, block, lane, state)
     sight.speed, sight.height, sight.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     sight.speed_before = block[EARLIER, lane]
-    ratio = 1.0 + (block[WORST, lane] - memory.energy[1]) / memory.energy[2]
-    memory.energy[0] = max(memory.energy[0], ratio)
+    energy.count(memory.energy, block[WORST, lane])
     step = done + int(block[DONE, lane])
-    every_counts = member.reference.horizon >= sight.time or _lies(sight, memory)
-    if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not every_counts:
+    lies = memory.energy[3] > 0.0 and sight.still == 0.0  # has never left the ground, and goes on moving
+    if block[STILL, lane] > 0.0 and sight.flight == 0.0 and not (member.reference.horizon >= sight.time or lies):
         step = until_kept(common.limits, done)  # the others would not change anything, either
-    return step if _show(common, member, samples, step, 0) else step - 1
+    observe(common.system, member, step, 0)
+    if memory.finite[0] > 0.0:
+        return step - 1
+    keep(common.limits, samples, state, step)
+    return step
 
 
 @njit
@@ -198,8 +177,10 @@ def _fast_forward(common: Common, member: Member, samples: States, done: int, le
         flown = fast_forward.fly(scheme, system, member, most)
         if flown > 0:
             moved = True
-            if _show(common, member, samples, done + flown, flown):
+            observe(system, member, done + flown, flown)
+            if memory.finite[0] == 0.0:
                 done += flown
+                keep(limits, samples, member.state, done)
             continue
         if left <= 0:
             break
@@ -209,7 +190,7 @@ def _fast_forward(common: Common, member: Member, samples: States, done: int, le
         # Every step counts where the motion is known by phases, has just come to rest or left the ground, or goes on
         # without ever having left it.
         known = sight.held > held or fast_forward.follows(scheme, system, member)
-        if known or sight.flight == 1.0 or _lies(sight, memory):
+        if known or sight.flight == 1.0 or (memory.energy[3] > 0.0 and sight.still == 0.0):
             most = 1
         elif sight.flight > 0.0 and fast_forward.undisturbed(system, sight) > 0.0:
             most = min(most, LONGEST)
@@ -287,13 +268,22 @@ def start(task: Task) -> Callable[[], bool] | None:
     scene, model = setup.scene, setup.model
     if setup.scheme != SCHEME or model not in TOUCHING:
         return None
-    axes, h = member_block.axes_of(scene), setup.step_size
-    k, e = batched_kernel.numbers_of(system.physics, axes, h), _balance(system.physics, axes, h, members.sight)
-    if not np.isfinite([*k._replace(onset=0.0)[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
+    axes, h, physics, sag = member_block.axes_of(scene), setup.step_size, system.physics, members.sight["sag"][0]
+    up, behind = axes[:, 2], schemes.LAGS[SCHEME] * h * physics.gravity
+    with np.errstate(all="ignore"):
+        weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
+        per_inertia = float(np.float64(0.5) / physics.inertia)
+        omega = float(np.sqrt(4 * physics.stiffness / np.float64(physics.mass)))
+    k, half_mass = batched_kernel.numbers_of(physics, axes, h), 0.5 * physics.mass
+    offset = half_mass * behind * behind
+    numbers = [*k._replace(onset=0.0)[:-1], *k.gain, half_mass, per_inertia, *weight, *lagging, offset, omega, sag]
+    if not np.isfinite(numbers).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)
-    common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, e, task.limits)
+    along = Vector(*weight.tolist()), Vector(*lagging.tolist())
+    energies = half_mass, per_inertia, *along, offset, omega, float(sag)
+    common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, task.limits, *energies)
     lanes = member_block.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
     waiting = 0
@@ -305,21 +295,3 @@ def start(task: Task) -> Callable[[], bool] | None:
         return waiting > 0
 
     return advance
-
-
-def _balance(physics: Physics, axes: Array, h: float, sight: npt.NDArray[np.void]) -> Balance:
-    up = axes[:, 2]
-    behind = schemes.LAGS[SCHEME] * h * physics.gravity
-    with np.errstate(all="ignore"):
-        weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
-        per_inertia = np.float64(0.5) / physics.inertia
-        omega = np.sqrt(4 * physics.stiffness / np.float64(physics.mass))
-    return Balance(
-        0.5 * physics.mass,
-        float(per_inertia),
-        Vector(*weight.tolist()),
-        Vector(*lagging.tolist()),
-        0.5 * physics.mass * behind * behind,
-        float(omega),
-        float(sight["sag"][0]),
-    )

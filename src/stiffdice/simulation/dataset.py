@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cache
 from importlib.metadata import version
 from typing import Any
 
@@ -28,22 +27,22 @@ from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import Run
 
-CONTACT_ATTRIBUTES = schema.attributes_of("shard", "contact", list(CONTACT_LAWS))
 VERDICTS = [verdict.name.lower() for verdict in Verdict]
 VERDICT_ATTRIBUTES = schema.attributes_of("shard", "verdict", VERDICTS)
-# What numbers and files depend on besides our code.
-_LIBRARIES = ("numpy", "numba", "llvmlite", "h5py", "h5netcdf", "xarray")
+# What computes and writes the numbers besides our code; Python does neither.
+_LIBRARIES = "; ".join(
+    f"{name} {version(name)}" for name in ("numpy", "numba", "llvmlite", "h5py", "h5netcdf", "xarray")
+)
 
 AXES = ("x", "y", "z")
 AXIS_ATTRIBUTES = schema.attributes_of("run", "axis", AXES)
-
 
 # By the measure's name.
 MEASURE_ATTRIBUTES = {
     criterion.MEASURE: {"long_name": criterion.LONG_NAME, "units": "1"} for criterion in CRITERIA.values()
 }
 CELL_ATTRIBUTES: dict[str, dict[str, Any]] = {
-    "contact": CONTACT_ATTRIBUTES,
+    "contact": schema.attributes_of("shard", "contact", list(CONTACT_LAWS)),
     **{name: schema.attributes_of("shard", name) for name in ("stiffness", "steps", "omega_h")},
 }
 
@@ -69,7 +68,7 @@ def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, *co
         "references": "Modeling and Simulating Dice (student paper, New York University)",
         "format_version": FORMAT_VERSION,
         "stiffdice_version": __version__,
-        "libraries": libraries(),
+        "libraries": _LIBRARIES,
         "code_digest": code_digest(*code),
         "scene": json.dumps(scene.as_mapping(), sort_keys=True),
         "scene_digest": scene.digest,
@@ -83,17 +82,6 @@ def config_attributes(kind: str, config: Mapping[str, Any]) -> dict[str, str]:
     """Return the attributes that say of which kind a file is, and what was asked: plain data, none of it the scene."""
     text = json.dumps(config, sort_keys=True)
     return {"kind": kind, "config": text, "config_digest": hashlib.sha256(text.encode()).hexdigest()}
-
-
-@cache
-def libraries() -> str:
-    """Return the versions of what computes and writes the numbers; Python's own is not among them: it does neither."""
-    return "; ".join(f"{name} {version(name)}" for name in _LIBRARIES)
-
-
-def simulator_attributes(simulator: str, version: str) -> dict[str, str]:
-    """Return the attributes that say who made the runs of a file, and of which version."""
-    return {"simulator": simulator, "simulator_version": version}
 
 
 def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
@@ -125,7 +113,9 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     code = "stiffdice.simulation.run", *backend.code_of(run.simulator)
     attributes = provenance_attributes(title, run.scene, run.model, run.scheme, *code)
     attributes |= config_attributes("run", config)
-    attributes |= simulator_attributes(run.simulator, run.simulator_version) | {
+    attributes |= {
+        "simulator": run.simulator,
+        "simulator_version": run.simulator_version,
         "model_reason": run.model_reason,
         "steps": run.steps,
         "step_size": run.scene.duration / run.steps,

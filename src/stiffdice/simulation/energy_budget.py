@@ -44,8 +44,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import backend, fixed_step
-from stiffdice.simulation.backend import Setup
+from stiffdice.simulation import backend
 
 # Schemes whose every step has a force to book.
 BOOKED = [name for name in schemes.SCHEMES if name not in schemes.OWN_STEPS]
@@ -58,7 +57,7 @@ _AT_ONCE = 2_000
 # A step that books more [J] ends the ledger, so that all sums of what is booked stay within doubles.
 LARGEST_WORK = 1e290
 
-# What is booked of a step [J].
+# What is booked of a step [J]; the last three are the scheme's.
 AMOUNTS = {
     "damping_work": "work of damping on nodes below the ground, with what it cuts off the springs' push",
     "drag_work": "work of the ungated law on nodes above the ground, damping and friction",
@@ -76,28 +75,31 @@ _DAMPING, _DRAG, _FRICTION, _SPRING = range(4)  # forces of the ground, in the o
 
 # A state as the ledger sees it. forces: force [N] and torque [N m] of each of the ground's; motion: velocity [m/s] and
 # L/I [rad/s]; energies [J], kinetic that of the stored velocity, less `lag` that of the velocity at the stored place;
-# clearance [m]: of the lowest node, or a positive lower bound of it.
+# energy: their sum with that one; clearance [m]: of the lowest node, or a positive lower bound of it.
 _VIEW = np.dtype(
     [
         ("forces", np.float64, (4, 6)),
         ("motion", np.float64, 6),
-        *((name, np.float64) for name in ("kinetic", "potential", "elastic", "lag", "clearance")),
+        *((name, np.float64) for name in ("kinetic", "potential", "elastic", "lag", "energy", "clearance")),
     ]
 )
 
-# Sums over the steps of the run, of its flights, and of each bounce: compensated, with what rounding loses apart.
-_ACCOUNT = np.dtype([("total", np.float64, len(AMOUNTS)), ("rest", np.float64, len(AMOUNTS))])
+# Accounts, each a compensated sum over steps and what rounding loses, apart: of the run, its flights, and each bounce.
 _RUN, _FLIGHTS, _BOUNCES = range(3)
 
-# A bounce. first_step: the last with every node above the ground (0 for a launch from within it). last_step: the first
-# in the air again, or the ledger's last where it has not ended. Energies [J]: at those steps; the most in the springs.
-_ROW = np.dtype(
-    [
-        *((name, np.int64) for name in ("first_step", "last_step")),
-        ("ended", np.bool_),
-        *((name, np.float64) for name in ("energy_before", "energy_after", "largest_elastic_energy")),
-    ]
-)
+_PLACE = "kinetic (of the velocity at the stored place), potential and elastic energy"
+
+# Of a bounce: type, meaning and unit. A launch from within the ground begins one, at step 0.
+_COLUMNS: dict[str, tuple[type, str, str]] = {
+    "first_step": (np.int64, "last step with every node above the ground", "1"),
+    "last_step": (np.int64, "first step in the air again, or the last one booked", "1"),
+    "start": (np.float64, "time of the bounce's first step", "s"),
+    "end": (np.float64, "time of the bounce's last step", "s"),
+    "energy_before": (np.float64, f"{_PLACE} at the bounce's first step", "J"),
+    "energy_after": (np.float64, f"{_PLACE} at the bounce's last step", "J"),
+    "largest_elastic_energy": (np.float64, "most energy in the springs in the bounce", "J"),
+}
+_ROW = np.dtype([*((name, kind) for name, (kind, _, _) in _COLUMNS.items()), ("ended", np.int64)])
 
 
 def ledger(
@@ -119,97 +121,57 @@ def ledger(
     for an unknown name, a step count out of range, and a model that the scene or the scheme does not allow.
     """
     validation.choice("scheme", scheme, BOOKED)
-    books = _Books(backend.setup_of(scene, model, backend.OURS, scheme, steps))
-    end = books.setup.steps if budget is None else budget
-    while books.done < end and books.advance(min(_AT_ONCE, end - books.done)):
-        pass
-    return books.dataset()
-
-
-class _Books:
-    """The ledger of a run so far. done: steps booked. bounces: how many. energies [J]: at the launch and now."""
-
-    def __init__(self, setup: Setup) -> None:
-        self.setup, self._physics = setup, physics_of(setup.scene)
-        self._tags = schemes.SCHEMES[setup.scheme], MODELS[setup.model]
-        self._rows = np.zeros(min(LARGEST, setup.steps), _ROW)
-        self._accounts = np.zeros(_BOUNCES + len(self._rows), _ACCOUNT)
-        self._state = start_of(setup.scene, setup.model)
-        self.done, self.bounces = 0, 0
-        self.energies = [float(_energy(self._views(self._state))[0])] * 2
-
-    def _views(self, states: States) -> npt.NDArray[np.void]:
-        views, late = np.zeros(len(states), _VIEW), self.setup.lag * self.setup.step_size
-        _look(self._physics._replace(node_weight=0.0), states, late, views)
-        return views
-
-    def advance(self, count: int) -> bool:
-        """Do and book so many steps; return whether all numbers stayed within doubles."""
-        h = self.setup.step_size
-        states = np.concatenate([self._state, np.zeros(count, STATE)])
-        fixed_step.advance(*self._tags, self._physics, states, 1, h, schemes.TOLERANCE)
-        self._state, views = states[-1:], self._views(states)
-        booked = _booked(self._physics, views[:-1], views[1:], self.setup.lag, h)
+    setup = backend.setup_of(scene, model, backend.OURS, scheme, steps)
+    physics, h, lag = physics_of(scene), setup.step_size, setup.lag
+    rows = np.zeros(min(LARGEST, setup.steps), _ROW)
+    accounts = np.zeros((_BOUNCES + len(rows), 2, len(AMOUNTS)))
+    states, launch, end = start_of(scene, setup.model), math.nan, setup.steps if budget is None else budget
+    done, bounces, goes_on = 0, 0, True
+    while goes_on:
+        states = np.concatenate([states[-1:], np.zeros(min(_AT_ONCE, end - done), STATE)])
+        schemes.advance(schemes.SCHEMES[scheme], MODELS[setup.model], physics, states, 1, h, schemes.TOLERANCE)
+        views = np.zeros(len(states), _VIEW)
+        _look(physics._replace(node_weight=0.0), states, lag * h, views)
+        booked = _booked(physics, views[:-1], views[1:], lag, h)
         with np.errstate(all="ignore"):
             sound = np.abs(booked).sum(axis=1) < LARGEST_WORK
         count = len(sound) if sound.all() else int(sound.argmin())
-        if count > 0:
-            self._post(views[: count + 1], booked[:count])
-        return count == len(sound)
+        bounces = _post(accounts, rows, views, booked[:count], done, bounces)
+        launch, now = launch if done > 0 else float(views["energy"][0]), float(views["energy"][count])
+        done += count
+        goes_on = count == len(sound) and done < end
+    for name, step in (("start", "first_step"), ("end", "last_step")):
+        rows[name] = rows[step] / setup.steps * scene.duration
+    return _dataset(launch, now, bounces, rows[:bounces], accounts.sum(axis=1)).assign_attrs(steps_done=done)
 
-    def _post(self, views: npt.NDArray[np.void], booked: Array) -> None:
-        """Add what is booked of steps, shape (step, amount), to the accounts; views: before, between and after them."""
-        up, energies, elastic = views["clearance"] > 0.0, _energy(views), views["elastic"]
-        steps, rows = self.done + np.arange(1, len(views)), self._rows
-        bounces = ~(up[:-1] & up[1:])
-        begins = bounces & (up[:-1] | (steps == 1))
-        number = self.bounces - 1 + np.cumsum(begins)  # of the bounce that a step is part of, if it is
-        _add(self._accounts, np.where(bounces, _BOUNCES + number, _FLIGHTS), booked)
-        inside = np.flatnonzero(bounces & (number < len(rows)))
-        first, bounce = inside[begins[inside]], number[inside]
-        rows["first_step"][number[first]] = steps[first] - 1
-        rows["energy_before"][number[first]] = energies[first]
-        rows["largest_elastic_energy"][number[first]] = elastic[first]
-        # Of the steps of one bounce the last is what stays.
-        rows["last_step"][bounce] = steps[inside]
-        rows["ended"][bounce] = up[inside + 1]
-        rows["energy_after"][bounce] = energies[inside + 1]
-        np.maximum.at(rows["largest_elastic_energy"], bounce, elastic[inside + 1])
-        self.done, self.energies[1] = int(steps[-1]), float(energies[-1])
-        self.bounces += int(begins.sum())
 
-    def dataset(self) -> xr.Dataset:
-        """Return the ledger's variables."""
-        place = "kinetic (of the velocity at the stored place), potential and elastic energy"
-        rows, booked = self._rows[: self.bounces], self._accounts["total"] + self._accounts["rest"]
-        (launch, end), first, last = self.energies, rows["first_step"], rows["last_step"]
-        totals: dict[str, tuple[Any, str, str]] = {
-            "launch_energy": (launch, f"{place} at the launch", "J"),
-            "end_energy": (end, f"{place} at the last step booked", "J"),
-            "bounce_count": (self.bounces, "bounces, those without a row included", "1"),
-            **_works("", booked[_RUN], "the run"),
-            **_works("flight_", booked[_FLIGHTS], "flights"),
-        }
-        springs = "the springs in the bounce"
-        start, stop = (step / self.setup.steps * self.setup.scene.duration for step in (first, last))
-        columns: dict[str, tuple[Any, str, str]] = {
-            "bounce_first_step": (first, "last step with every node above the ground", "1"),
-            "bounce_last_step": (last, "first step in the air again, or the last one booked", "1"),
-            "bounce_start": (start, "time of the bounce's first step", "s"),
-            "bounce_end": (stop, "time of the bounce's last step", "s"),
-            "bounce_energy_before": (rows["energy_before"], f"{place} at the bounce's first step", "J"),
-            "bounce_energy_after": (rows["energy_after"], f"{place} at the bounce's last step", "J"),
-            "bounce_largest_elastic_energy": (rows["largest_elastic_energy"], f"most energy in {springs}", "J"),
-            **_works("bounce_", booked[_BOUNCES:][: self.bounces], "the bounce"),
-        }
-        variables: dict[str, Any] = {
-            name: (dimensions, values, {"long_name": text, "units": unit})
-            for dimensions, described in (((), totals), (("bounce",), columns))
-            for name, (values, text, unit) in described.items()
-        }
-        ended = enum_attributes("whether the bounce was over at the last step booked", ENDED)
-        variables["bounce_ended"] = ("bounce", rows["ended"].astype(np.int8), ended)
-        return xr.Dataset(variables, attrs={"steps_done": self.done})
+def _dataset(launch: float, now: float, bounces: int, rows: npt.NDArray[np.void], booked: Array) -> xr.Dataset:
+    """Return a ledger's variables; launch, now: energies [J]."""
+    described: dict[str, tuple[tuple[str, ...], Any, str, str]] = {
+        "launch_energy": ((), launch, f"{_PLACE} at the launch", "J"),
+        "end_energy": ((), now, f"{_PLACE} at the last step booked", "J"),
+        "bounce_count": ((), bounces, "bounces, those without a row included", "1"),
+        **_works((), "", booked[_RUN], "the run"),
+        **_works((), "flight_", booked[_FLIGHTS], "flights"),
+        **{f"bounce_{name}": (("bounce",), rows[name], text, unit) for name, (_, text, unit) in _COLUMNS.items()},
+        **_works(("bounce",), "bounce_", booked[_BOUNCES:][:bounces], "the bounce"),
+    }
+    variables: dict[str, Any] = {
+        name: (dimensions, values, {"long_name": text, "units": unit})
+        for name, (dimensions, values, text, unit) in described.items()
+    }
+    ended = enum_attributes("whether the bounce was over at the last step booked", ENDED)
+    variables["bounce_ended"] = ("bounce", rows["ended"].astype(np.int8), ended)
+    return xr.Dataset(variables)
+
+
+def _works(
+    dimensions: tuple[str, ...], prefix: str, booked: Array, where: str
+) -> dict[str, tuple[tuple[str, ...], Array, str, str]]:
+    """Return dimensions, values, meaning and unit of each amount, shape (..., amount), and of the scheme's work."""
+    works = {name: (booked[..., k], text) for k, (name, text) in enumerate(AMOUNTS.items())}
+    works["scheme_work"] = booked[..., -3:].sum(axis=-1), "energy that the scheme made, the sum of its defects"
+    return {prefix + name: (dimensions, values, f"{text}, in {where}", "J") for name, (values, text) in works.items()}
 
 
 @njit(cache=True)
@@ -225,6 +187,7 @@ def _look(physics: Physics, states: States, late: float, views: npt.NDArray[np.v
         view.potential = energy.potential(physics, state)
         view.elastic = energy.elastic(physics, state)
         view.lag = physics.mass * fall * (state.velocity[2] - 0.5 * fall)
+        view.energy = view.kinetic + view.potential + view.elastic - view.lag
         view.clearance = _feel(physics, state, view.forces)
 
 
@@ -276,32 +239,34 @@ def _booked(physics: Physics, before: npt.NDArray[np.void], after: npt.NDArray[n
     return np.stack([damping, drag, friction, of_springs, of_gravity, *defects], axis=1)
 
 
-@np.errstate(all="ignore")
-def _energy(views: npt.NDArray[np.void]) -> Array:
-    """Return the energies with the velocity at the stored place [J]."""
-    return np.asarray(views["kinetic"] + views["potential"] + views["elastic"] - views["lag"])
-
-
 @njit(cache=True)
-def _add(accounts: npt.NDArray[np.void], parts: npt.NDArray[np.int64], booked: Array) -> None:
-    """Add each step to the run's account, and to that of its part if there is one (compensated, Neumaier 1974)."""
+def _post(
+    accounts: Array, rows: npt.NDArray[np.void], views: npt.NDArray[np.void], booked: Array, done: int, bounces: int
+) -> int:
+    """Add what is booked of steps, shape (step, amount), to the accounts and the rows; return the bounces in all.
+
+    views: before, between and after them. done: steps before. Sums are compensated (Neumaier 1974).
+    """
     for step in range(len(booked)):
-        for number in (_RUN, parts[step]):
-            if number >= len(accounts):
-                continue
-            account = accounts[number]
-            for k in range(booked.shape[1]):
-                total, amount = account.total[k], booked[step, k]
-                account.total[k] = total + amount
-                if abs(total) >= abs(amount):
-                    account.rest[k] += (total - account.total[k]) + amount
-                else:
-                    account.rest[k] += (amount - account.total[k]) + total
-
-
-def _works(prefix: str, booked: Array, where: str) -> dict[str, tuple[Array, str, str]]:
-    """Return values, meaning and unit of each amount, shape (..., amount), and of the scheme's work."""
-    works = {name: (booked[..., k], text) for k, (name, text) in enumerate(AMOUNTS.items())}
-    made = booked[..., -3:].sum(axis=-1)
-    works["scheme_work"] = made, "energy that the scheme made, the sum of its defects"
-    return {prefix + name: (values, f"{text}, in {where}", "J") for name, (values, text) in works.items()}
+        before, after = views[step], views[step + 1]
+        part = _FLIGHTS
+        if not (before.clearance > 0.0 and after.clearance > 0.0):
+            begins = before.clearance > 0.0 or done + step == 0
+            bounces += 1 if begins else 0
+            part = _BOUNCES + bounces - 1
+            if bounces <= len(rows):
+                row = rows[bounces - 1]
+                if begins:
+                    row.first_step, row.energy_before = done + step, before.energy
+                    row.largest_elastic_energy = before.elastic
+                row.last_step, row.energy_after = done + step + 1, after.energy
+                row.ended = 1 if after.clearance > 0.0 else 0
+                row.largest_elastic_energy = max(row.largest_elastic_energy, after.elastic)
+        for number in (_RUN, part):
+            for k in range(booked.shape[1] if number < len(accounts) else 0):
+                total, amount = accounts[number, 0, k], booked[step, k]
+                now = total + amount
+                large, small = (total, amount) if abs(total) >= abs(amount) else (amount, total)
+                accounts[number, 0, k] = now
+                accounts[number, 1, k] += (large - now) + small
+    return bounces

@@ -16,10 +16,12 @@ import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import drags, height_of, lowest_of, reaches, speed_of, swing_square
+from stiffdice.dynamics.contact import drags, height_of, lowest_of, normal_of, reaches, speed_of, swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.vector import Vector, cross, dot, row, vector
 from stiffdice.integrators import registry as schemes
+from stiffdice.integrators.free_flight import landing
 from stiffdice.simulation.task import Member, System
 
 # Fewer than this are stepped: looking ahead costs about as much.
@@ -50,17 +52,6 @@ def undisturbed(system: System, sight: Any) -> float:
 
 
 @njit
-def _until(room: Any, speed: Any, pull: Any, h: Any) -> Any:
-    """Return after how many steps of h [s] a body at `speed` [m/s] under `pull` [m/s²] has fallen by `room` [m]."""
-    if pull > 0.0:
-        root = math.sqrt(speed * speed + 2 * pull * room)
-        return ((speed + root) / pull if speed > 0.0 else 2 * room / (root - speed)) / h
-    if pull < 0.0 or speed >= 0.0:
-        return 0.0 if speed < 0.0 else math.inf
-    return room / -speed / h
-
-
-@njit
 def compared(member: Member, most: int) -> int:
     """Return how many of `most` steps may go by unseen: a reference is looked at as often as it is known."""
     sight, reference = member.sight, member.reference
@@ -81,7 +72,7 @@ def fly(scheme: Any, system: System, member: Member, most: int) -> int:
     # A scheme's path may be off the parabola by a step's move or two.
     margin = 4 * h * (abs(sight.speed) + h * abs(sight.pull))
     room = sight.height - models.extent(model, physics, state) - margin
-    steps = _until(room, sight.speed - h * sight.pull, sight.pull, h) if room > 0.0 else 0.0
+    steps = landing(sight.pull, room, sight.speed - h * sight.pull) / h if room > 0.0 else 0.0
     unforced = undisturbed(system, sight)
     steps = min(steps, unforced)
     if models.turns(model) and steps < most and unforced > steps:
@@ -100,23 +91,21 @@ def _turning(physics: Physics, state: Any, sight: Any, margin: float) -> float:
     A node at r moves up at n·(u + ω × r), and what turning adds to its acceleration is (n × ω)·(ω × r), at most
     |n × ω| |ω| |r|. So its path stays above a parabola, the closer the shorter it is.
     """
-    n, w = (physics.nx, physics.ny, physics.nz), state.angular_momentum
-    wx, wy, wz = w[0] / physics.inertia, w[1] / physics.inertia, w[2] / physics.inertia
-    ax, ay, az = n[1] * wz - n[2] * wy, n[2] * wx - n[0] * wz, n[0] * wy - n[1] * wx
-    bend = math.sqrt((ax * ax + ay * ay + az * az) * (wx * wx + wy * wy + wz * wz)) * physics.reach
+    n, momentum = normal_of(physics), vector(state.angular_momentum)
+    w = Vector(momentum.x / physics.inertia, momentum.y / physics.inertia, momentum.z / physics.inertia)
+    across = cross(n, w)
+    bend = math.sqrt(dot(across, across) * dot(w, w)) * physics.reach
     pull, h = sight.pull + bend, sight.step_size
     if not pull > 0.0:
         return 0.0
     soonest = math.inf
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        rx, ry, rz = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        room = sight.height + (n[0] * rx + n[1] * ry + n[2] * rz) - margin
+    for k in range(len(state.node_offset)):
+        node = row(state.node_offset, k)
+        room = sight.height + dot(n, node) - margin
         if not room > 0.0:
             return 0.0
         # n·(ω × r) = (n × ω)·r
-        speed = sight.speed - h * pull + (ax * rx + ay * ry + az * rz)
-        soonest = min(soonest, _until(room, speed, pull, h))
+        soonest = min(soonest, landing(pull, room, sight.speed - h * pull + dot(across, node)) / h)
     return soonest
 
 
@@ -199,32 +188,26 @@ def resting_swing(system: System, sight: Any) -> float:
 
 
 @njit
-def _rests(system: System, sight: Any) -> bool:
+def _stays(system: System, sight: Any, rubs: bool) -> bool:
     """Return whether a flat cube swings about its rest by less than its sag, so that it never leaves the ground.
 
-    Round-off of the height adds at most ω·ulp in a step to √Q.
+    Or, without friction, sinks through the air as fast as its drag allows, and ends before it lands. Round-off of the
+    height adds at most ω·ulp in a step to √Q.
     """
-    # (ω·sag)² is pull·sag; most steps end here.
-    if not sight.clearance < 0.0 or sight.speed * sight.speed > 2 * sight.pull * sight.sag:
+    physics, h = system.physics, sight.step_size
+    drag, weight, ulp = 8 * physics.damping, physics.mass * sight.pull, 2.0**-52 * abs(sight.height)
+    if sight.clearance < 0.0:
+        if sight.speed * sight.speed > 2 * sight.pull * sight.sag:  # (ω·sag)² is pull·sag; most steps end here
+            return False
+        omega = math.sqrt(4 * physics.stiffness / physics.mass)
+        square = swing_square(omega, h, sight.clearance + sight.sag, sight.speed)
+        return math.sqrt(square) + sight.steps * omega * ulp < resting_swing(system, sight)
+    if rubs or sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0:
         return False
-    omega = math.sqrt(4 * system.physics.stiffness / system.physics.mass)
-    square = swing_square(omega, sight.step_size, sight.clearance + sight.sag, sight.speed)
-    lost = sight.steps * omega * 2.0**-52 * abs(sight.height)
-    return math.sqrt(square) + lost < resting_swing(system, sight)
-
-
-@njit
-def _hangs(system: System, sight: Any) -> bool:
-    """Return whether a flat cube that sinks through the air as fast as its drag allows ends before it lands."""
-    drag, mass = 8 * system.physics.damping, system.physics.mass
-    weight = mass * sight.pull
-    if sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0 or not drags(system.physics):
+    if not drags(system.physics) or drag * h > physics.mass:
         return False
-    if drag * sight.step_size > mass:
-        return False
-    left = sight.steps * sight.step_size - (sight.time - sight.late)
-    lost = sight.steps * 2.0**-52 * abs(sight.height)
-    return max(-sight.speed, weight / drag) * left + lost < sight.clearance
+    left = sight.steps * h - (sight.time - sight.late)
+    return max(-sight.speed, weight / drag) * left + sight.steps * ulp < sight.clearance
 
 
 @njit
@@ -259,10 +242,8 @@ def skip(scheme: Any, system: System, member: Member, most: int) -> int:
     if models.turns(system.model) or not sight.room > 0.0:
         return 0
     rubs = _rubs(physics, state)
-    stays = not rubs and sight.still > 0.0
-    if schemes.proven(scheme) and not stays:
-        stays = _rests(system, sight) or (not rubs and _hangs(system, sight))
-    if stays and sight.held == 0.0:
+    still = not rubs and sight.still > 0.0
+    if sight.held == 0.0 and (still or (schemes.proven(scheme) and _stays(system, sight, rubs))):
         sight.held = 1.0
         return 0
     if not follows(scheme, system, member) or sight.flight == 1.0 or most < WORTHWHILE + 2 or lost(sight):

@@ -11,8 +11,7 @@ import math
 
 import numpy as np
 
-from stiffdice.dynamics.rotation import along, rotated
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, Ensemble, States, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Ensemble, States, along, rotated, start_of
 from stiffdice.errors import InputError
 from stiffdice.scene.scene import Scene
 
@@ -29,36 +28,24 @@ def turned(scene: Scene, model: str, count: int) -> States:
         return members
     spin = math.hypot(*scene.launch.spin)
     offsets = scene.cube.node_offsets()
-    for member, (u, v, w, p, q) in zip(members[1:], _sequence(count - 1, 5), strict=True):
-        member["node_offset"] = rotated(offsets, _rotation_vector(u, v, w))
+    # Points that fill the unit cube evenly: an additive recurrence whose steps are powers of the root of x⁶ = x + 1
+    # (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), the golden ratio's generalisation.
+    root = 2.0
+    for _ in range(64):
+        root = (1 + root) ** (1 / 6)
+    points = (0.5 + np.outer(np.arange(1, count), root ** -np.arange(1.0, 6))) % 1
+    for member, (u, v, w, p, q) in zip(members[1:], points, strict=True):
+        a, b = math.sqrt(1 - u), math.sqrt(u)
+        vector = np.array([a * math.sin(2 * math.pi * v), a * math.cos(2 * math.pi * v), b * math.sin(2 * math.pi * w)])
+        length = math.hypot(*vector)
+        angle = 2 * math.atan2(length, b * math.cos(2 * math.pi * w))
+        member["node_offset"] = rotated(offsets, vector / length * angle if length > 0 else vector)
         across = math.sqrt(1 - (2 * p - 1) ** 2)
         axis = np.array([across * math.cos(2 * math.pi * q), across * math.sin(2 * math.pi * q), 2 * p - 1])
         member["angular_momentum"] = spin * axis
         if scene.launch.node_velocity == "rigid":
             member["angular_velocity"] = member["angular_momentum"] / scene.cube.moment_of_inertia
     return members
-
-
-def _sequence(count: int, dimensions: int) -> Array:
-    """Return points that fill the unit cube evenly, shape (count, dimensions): an additive recurrence.
-
-    Its steps are powers of the root of x^(d+1) = x + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom
-    sequences"), the generalisation of the golden ratio.
-    """
-    root = 2.0
-    for _ in range(64):
-        root = (1 + root) ** (1 / (dimensions + 1))
-    steps = root ** -np.arange(1.0, dimensions + 1)
-    return np.asarray((0.5 + np.outer(np.arange(1, count + 1), steps)) % 1)
-
-
-def _rotation_vector(u: float, v: float, w: float) -> Array:
-    """Return the rotation [rad], uniform over all rotations if u, v, w are uniform over [0, 1]."""
-    a, b = math.sqrt(1 - u), math.sqrt(u)
-    vector = np.array([a * math.sin(2 * math.pi * v), a * math.cos(2 * math.pi * v), b * math.sin(2 * math.pi * w)])
-    scalar = b * math.cos(2 * math.pi * w)
-    length = math.hypot(*vector)
-    return np.asarray(vector / length * 2 * math.atan2(length, scalar)) if length > 0 else np.zeros(3)
 
 
 def phased(

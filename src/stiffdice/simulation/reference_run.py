@@ -10,8 +10,8 @@ import numpy.typing as npt
 from stiffdice.dynamics.state import Array, Ensemble, States
 from stiffdice.errors import InputError
 from stiffdice.scene.scene import Scene
+from stiffdice.simulation.criteria.trajectory import SAMPLES, empty
 from stiffdice.simulation.outcome import Verdict
-from stiffdice.simulation.reference import SAMPLES, empty
 from stiffdice.simulation.run import simulate
 
 # Errors at this tolerance do not matter: about a millionth of a step's, in contact. One made a hundred times as large

@@ -24,8 +24,8 @@ from stiffdice.simulation.criteria import judge
 from stiffdice.simulation.criteria.apex import default_hop_height
 from stiffdice.simulation.criteria.registry import MEMORY, finish, limits_of, observe, open_of, tolerances_of, values
 from stiffdice.simulation.criteria.registry import start as criteria_start
+from stiffdice.simulation.criteria.trajectory import empty
 from stiffdice.simulation.monitor import SIGHT
-from stiffdice.simulation.reference import empty
 from stiffdice.simulation.task import Limits, Member, Members, System, Task, keep, room_for, until_kept
 
 # Steps and force evaluations, about, after which compiled code returns, to see signals and tell progress: a twentieth

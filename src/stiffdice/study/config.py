@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,15 +15,25 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.state import TURNING, start_of
 from stiffdice.errors import InputError, NotInstalledError, printable
+from stiffdice.integrators import registry as schemes
 from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.initial_conditions import phased, turned
-from stiffdice.study import catalogue, schema_check
+from stiffdice.study import catalogue
 from stiffdice.sweep.grid import Sweep
+
+# What the schema of a study's file leaves to the code.
+_NAMES = {
+    "model": model_selection.CHOICES,
+    "scheme": schemes.SCHEMES,
+    "simulator": (backend.OURS, *engines.ENGINES),
+    "contact_law": CONTACT_LAWS,
+}
 
 # In units of the side: nodes that are this level land at once, as far as their restitution shows.
 _FLAT = 1e-9
@@ -104,9 +115,12 @@ def load(path: str | Path, schema: str | Path) -> Study:
     if not NAME.fullmatch(Path(path).stem):
         raise InputError(f"{path}: allowed in a study's name are letters, digits, hyphens and underscores")
     if not Path(path).exists():
-        raise InputError(_missing(Path(path)))
+        above, name = Path(path).parent, Path(path).stem
+        there = sorted(other.stem for other in above.glob("*.yaml") if NAME.fullmatch(other.stem))
+        told = f"those in {above}/ are {', '.join(there)}" if there else f"{above}/ has none"
+        raise InputError(f"{path}: there is no study {name}; {told}{validation.meant(name, there)}")
     data = yaml_loader.load(path)
-    schema_check.check(data, schema, str(path))
+    _check(data, yaml_loader.load(schema), str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
         left_out: list[str] = []
@@ -116,21 +130,12 @@ def load(path: str | Path, schema: str | Path) -> Study:
             "experiments": _installed(data, "experiments", partial(_experiment, catalogue.EXPERIMENTS), left_out),
             "timings": _installed(data, "timings", partial(_experiment, catalogue.TIMINGS), left_out),
         }
-        shown = {
-            kind: {
-                name: _planned_figure(f"{kind}.{name}", registry, part, data)
-                for name, part in data.get(kind, {}).items()
-            }
-            for kind, registry in (("figures", catalogue.DRAWINGS), ("tables", catalogue.TABLES))
-        }
-        for name, figure in shown["figures"].items():
-            _check_turns(f"figures.{name}", figure, parts["runs"])
         return Study(
             name=Path(path).stem,
             question=data["question"],
             **parts,
-            figures=_shown("figures", shown["figures"], catalogue.DRAWINGS, parts, left_out),
-            tables=_shown("tables", shown["tables"], catalogue.TABLES, parts, left_out),
+            figures=_shown(data, "figures", catalogue.DRAWINGS, parts, left_out),
+            tables=_shown(data, "tables", catalogue.TABLES, parts, left_out),
             dpi=int(data.get("dpi", 150)),
             left_out=tuple(left_out),
         )
@@ -138,11 +143,45 @@ def load(path: str | Path, schema: str | Path) -> Study:
         raise error.within(str(path)) from None
 
 
-def _missing(path: Path) -> str:
-    """Return what to say of a study that is not there: those that are, and which was meant if one is near."""
-    there = sorted(other.stem for other in path.parent.glob("*.yaml") if NAME.fullmatch(other.stem))
-    told = f"those in {path.parent}/ are {', '.join(there)}" if there else f"{path.parent}/ has none"
-    return f"{path}: there is no study {path.stem}; {told}{validation.meant(path.stem, there)}"
+def _check(data: object, schema: Any, source: str) -> None:
+    """Raise InputError unless a study's data are as a JSON schema says, which leaves names to the code."""
+    import jsonschema  # which takes a while to import
+
+    numbers = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number)
+    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)  # type: ignore[no-untyped-call]
+    for name, words in _NAMES.items():
+        schema["$defs"][name] = {"enum": list(words), "errorMessage": f"allowed is {' or '.join(words)}"}
+    error = jsonschema.exceptions.best_match(kind(schema).iter_errors(data))
+    if error is not None:
+        raise InputError(f"{source}: {_reason(error)}")
+
+
+def _is_number(_checker: object, value: object) -> bool:
+    """Return whether a value is a number; NaN is none: no bound of a schema stops it."""
+    return not isinstance(value, bool) and (
+        isinstance(value, int) or (isinstance(value, float) and not math.isnan(value))
+    )
+
+
+def _reason(error: Any) -> str:
+    """Return a schema error as one line that names the key, its value and what is allowed."""
+    where = ".".join(str(part) for part in error.absolute_path)
+    try:
+        if error.validator == "additionalProperties":
+            validation.known_keys(where, error.instance, list(error.schema["properties"]))
+    except InputError as unknown:
+        return str(unknown)
+    if error.validator == "required":
+        missing = [key for key in error.validator_value if key not in error.instance]
+        return f"{where + '.' if where else ''}{missing[0]} is missing"
+    allowed = error.schema.get("errorMessage")
+    if error.validator == "enum" and allowed:
+        allowed += validation.meant(error.instance, error.validator_value)
+    if error.validator == "oneOf":
+        return f"{where}: {allowed}"
+    if "propertyNames" in error.absolute_schema_path:
+        return f"{where}.{error.instance}: allowed names have small letters, digits and hyphens"
+    return f"{where or 'the file'} = {validation.shown(error.instance)}: {allowed or error.message}"
 
 
 def _installed(
@@ -163,19 +202,24 @@ def _installed(
 
 
 def _shown(
+    data: Mapping[str, Any],
     kind: str,
-    planned: Mapping[str, PlannedFigure],
-    entries: Mapping[str, catalogue.Entry],
+    registry: Mapping[str, catalogue.Entry],
     parts: Mapping[str, Mapping[str, Any]],
     left_out: list[str],
 ) -> dict[str, PlannedFigure]:
     """Return figures or tables of what there is, without those that would have nothing to show."""
     shown = {}
-    for name, part in planned.items():
-        there = tuple(source for source in part.of if source in parts[entries[part.draw].given])
-        timings = tuple(source for source in part.timings if source in parts["timings"])
-        if there and bool(timings) == bool(part.timings):
-            shown[name] = part._replace(of=there, timings=timings)
+    for name, part in data.get(kind, {}).items():
+        planned = _planned_figure(f"{kind}.{name}", registry, part, data)
+        there = tuple(source for source in planned.of if source in parts[registry[planned.draw].given])
+        timings = tuple(source for source in planned.timings if source in parts["timings"])
+        if planned.draw.startswith(("cube", "animation")):
+            for run in there:
+                if not _models_of(parts["runs"][run]) <= TURNING:
+                    raise InputError(f"{kind}.{name}.run = {run}: {planned.draw} needs a run of model tumbling")
+        if there and bool(timings) == bool(planned.timings):
+            shown[name] = planned._replace(of=there, timings=timings)
         else:
             left_out.append(f"left out: {kind}.{name}: nothing of what it shows is there")
     return shown
@@ -214,35 +258,22 @@ def _planned_figure(
     takes = {"run": "runs"} if entry.given == "runs" else {"of": entry.given}
     if entry.timed:
         takes["timings"] = "timings"
-    for key in ("run", "of", "timings"):
-        if key in part and key not in takes:
-            told = "; ".join(f"name {kind} with `{other}`" for other, kind in takes.items())
+    asked = {key: [part[key]] if key == "run" else part[key] for key in ("run", "of", "timings") if key in part}
+    for key, names in asked.items():
+        if key not in takes:
+            told = "; ".join(f"name {given} with `{other}`" for other, given in takes.items())
             raise InputError(f"{where}.{key} = {validation.shown(part[key])}: {draw} shows none of these; {told}")
-    planned = PlannedFigure(draw, _names(part.get("run", part.get("of"))), part["title"], _names(part.get("timings")))
-    if not planned.of:
-        raise InputError(f"{where}.{'run' if 'run' in takes else 'of'} is missing: {draw} needs names of {entry.given}")
-    for (key, kind), names in zip(takes.items(), (planned.of, planned.timings), strict=False):
+        kind, allowed = takes[key], data.get(takes[key], {})
         for name in names:
-            allowed = data.get(kind, {})
             if name not in allowed:
                 told = " or ".join(allowed) or f"none: this study has no {kind}"
                 raise InputError(f"{where}.{key} = {name}: allowed is {told}{validation.meant(name, allowed)}")
             if entry.measures and allowed[name]["measure"] != entry.measures:
                 raise InputError(f"{where}.{key} = {name}: {draw} shows only {kind} that measure {entry.measures}")
-    return planned
-
-
-def _names(given: str | Sequence[str] | None) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(given or ())
-
-
-def _check_turns(where: str, planned: PlannedFigure, runs: Mapping[str, PlannedRun]) -> None:
-    """Raise InputError if a figure shows how a cube turns in a run that has no turning."""
-    if not planned.draw.startswith(("cube", "animation")):
-        return
-    for name in planned.of:
-        if name in runs and not _models_of(runs[name]) <= TURNING:
-            raise InputError(f"{where}.run = {name}: {planned.draw} needs a run of model tumbling")
+    first, *_ = takes
+    if first not in asked:
+        raise InputError(f"{where}.{first} is missing: {draw} needs names of {entry.given}")
+    return PlannedFigure(draw, tuple(asked[first]), part["title"], tuple(asked.get("timings", ())))
 
 
 def _experiment(
@@ -259,23 +290,21 @@ def _experiment(
     for key, value in options.items():
         _same_kind(f"options.{key}", value, known[key])
     if "methods" in options:
-        options["methods"] = _installed_of(options["methods"], missing)
+        options["methods"] = [method for method in options["methods"] if _is_installed(method, missing)]
+        if missing and not options["methods"]:
+            raise NotInstalledError("methods: none of them is left")
     return Experiment(measure, experiment["scene"], changes, options)
 
 
-def _installed_of(methods: Sequence[str], missing: list[NotInstalledError]) -> list[str]:
-    """Return the methods without engines that are not installed; raises NotInstalledError if none is left."""
-    found = []
-    for method in methods:
-        try:
-            if method in engines.ENGINES:
-                engines.adapter_of(method, "methods")
-            found.append(method)
-        except NotInstalledError as error:
-            missing.append(error)
-    if missing and not found:
-        raise NotInstalledError("methods: none of them is left")
-    return found
+def _is_installed(method: str, missing: list[NotInstalledError]) -> bool:
+    """Return whether a method is there; `missing` gets the error of an engine that is not installed."""
+    try:
+        if method in engines.ENGINES:
+            engines.adapter_of(method, "methods")
+    except NotInstalledError as error:
+        missing.append(error)
+        return False
+    return True
 
 
 def _same_kind(key: str, value: object, default: Any) -> None:
@@ -297,31 +326,21 @@ def _same_kind(key: str, value: object, default: Any) -> None:
 
 
 def _sweep(given_criteria: Mapping[str, float] | None, sweep: Mapping[str, Any], _missing: object) -> Sweep:
-    criteria = sweep.get("criteria", given_criteria)
     scene = scenes.load(sweep["scene"], sweep.get("set", ()))
     stiffness, simulator = sweep["stiffness"], sweep.get("simulator", backend.OURS)
-    asked = Sweep(
-        scene,
-        sweep["model"],
-        backend.scheme_of(simulator, sweep.get("scheme")),
-        tuple(sweep["contact"]),
-        {"from": stiffness, "to": stiffness, "count": 1} if isinstance(stiffness, int | float) else stiffness,
-        sweep.get("steps"),
-        sweep.get("omega_h"),
-        int(sweep["members"]),
-        int(sweep.get("seed", 0)),
-        int(sweep.get("refine", 0)),
-        {},
-        bool(sweep.get("early_stop", True)),
-        float(sweep.get("horizon", scene.duration)),
-        sweep.get("seconds_per_job"),
-        simulator=simulator,
-        reach=sweep.get("reach"),
-        hop_height=sweep.get("hop_height"),
-    )
-    model, reason = _model_of(asked)
-    planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=tolerances_of(model, criteria))
-    for column in planned.columns():
+    given = {key: value for key, value in sweep.items() if key not in ("set", "criteria")}
+    given |= {key: int(sweep[key]) for key in ("members", "seed", "refine") if key in sweep}
+    given |= {"scene": scene, "scheme": backend.scheme_of(simulator, sweep.get("scheme"))}
+    given |= {"contact": tuple(sweep["contact"]), "horizon": float(sweep.get("horizon", scene.duration))}
+    if isinstance(stiffness, int | float):
+        given["stiffness"] = {"from": stiffness, "to": stiffness, "count": 1}
+    asked = Sweep(**given, criteria={})
+    columns = asked.columns()
+    longest_step = scene.duration / max(1.0, min(asked.step_range(column.stiffness)[0] for column in columns))
+    model, reason = model_selection.chosen(asked.model, map(asked.scene_of, columns), longest_step)
+    criteria = tolerances_of(model, sweep.get("criteria", given_criteria))
+    planned = dataclasses.replace(asked, model=model, model_reason=reason, criteria=criteria)
+    for column in columns:
         backend.check_fit(simulator, planned.scheme, planned.scene_of(column), model)
     if not planned.criteria:
         raise InputError(f"criteria: none of them means anything for model {planned.model}")
@@ -330,7 +349,7 @@ def _sweep(given_criteria: Mapping[str, float] | None, sweep: Mapping[str, Any],
     for span in [planned.stiffness] if isinstance(planned.stiffness, Mapping) else planned.stiffness:
         if span["from"] > span["to"]:
             raise InputError(f"stiffness.from = {span['from']:g}: allowed is a number <= to = {span['to']:g} [kg/s²]")
-    if any(column != (scene.ground.contact, scene.ground.stiffness) for column in planned.columns()):
+    if any(column != (scene.ground.contact, scene.ground.stiffness) for column in columns):
         _refuse_restitution(scene, "the sweep sets others")
     for key in ("stiffness", "contact"):
         for override in sweep.get("set", ()):
@@ -338,13 +357,12 @@ def _sweep(given_criteria: Mapping[str, float] | None, sweep: Mapping[str, Any],
                 raise InputError(f"set: {override}: the sweep sets this itself, from its key {key}")
     if "restitution" in planned.criteria and not model_selection.lands_flat(scene, _FLAT):
         raise InputError("criteria.restitution: is known exactly for flat landings only, and this cube lands tilted")
-    most = max(planned.step_range(column.stiffness)[1] for column in planned.columns())
+    most = max(planned.step_range(column.stiffness)[1] for column in columns)
     if not most <= validation.LARGEST_COUNT:
         key = "steps" if planned.steps else "omega_h"
         raise InputError(f"{key}: asks for up to {most:.3g} steps; allowed are {validation.LARGEST_COUNT}")
-    longest = min((planned.scan(column)[0], column) for column in planned.columns())
-    launches = turned(scene, planned.model, planned.members)
-    phased(planned.scene_of(longest[1]), planned.model, longest[0], planned.members, launches)
+    fewest, column = min((planned.scan(column)[0], column) for column in columns)
+    phased(planned.scene_of(column), model, fewest, planned.members, turned(scene, model, planned.members))
     return planned
 
 
@@ -355,11 +373,3 @@ def _refuse_restitution(scene: scenes.Scene, reason: str) -> None:
             f"scene: its ground.restitution is that of stiffness {scene.ground.stiffness:g} kg/s² and the "
             f"{scene.ground.contact} law alone, and {reason}; give ground.damping"
         )
-
-
-def _model_of(sweep: Sweep) -> tuple[str, str]:
-    """Return the model of a sweep, one for all its columns, and why."""
-    columns = sweep.columns()
-    fewest = min(sweep.step_range(column.stiffness)[0] for column in columns)
-    longest_step = sweep.scene.duration / max(1.0, fewest)
-    return model_selection.chosen(sweep.model, map(sweep.scene_of, columns), longest_step)

@@ -1,4 +1,4 @@
-"""About how long the jobs of a study take, told before any of them has run.
+"""About how long the jobs of a study take, told before any of them has run; and what is left, by how long others took.
 
 Seconds are of one core of the machine that `cost` is of, otherwise idle; how this one compares, a sum of numbers in a
 row says within a hundredth of a second (`slowness`), and what else runs on it, the system (`crowding`). What `cost`
@@ -10,13 +10,18 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
 from stiffdice.study import outputs
 from stiffdice.study.catalogue import DRAWINGS
-from stiffdice.study.config import Experiment, Study
+from stiffdice.study.config import Study
+from stiffdice.study.job_log import Told
 from stiffdice.study.outputs import Result
 from stiffdice.sweep import partition as shards
 
@@ -53,9 +58,49 @@ _NUMBERS, _SUM = np.ones(4096), 1.27e-5
 _LOOK = 0.01
 
 
+class Job(NamedTuple):
+    """What is known of how long the job of a result takes [s].
+
+    weight: jobs of one kind take as long as it says. took: the job, when it last ended well, if it is known. due:
+    whether it is still to be made. log: of a running one.
+    """
+
+    result: Result
+    weight: float
+    took: float | None
+    due: bool
+    log: Told | None = None
+
+
+def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
+    """Return about how long [s] the jobs that are due take; `cores` of them at a time, timings one by one.
+
+    A job takes as long as its progress says, else as it took before; one that never ended, as the median of its kind.
+    Of a kind of which none ended, as all that have; where none has, `pace` [s] for each of its weight.
+    """
+    known = []
+    for (stage, name, _), weight, took, due, log in jobs:
+        kind, elapsed, whole = f"shard {name.partition('/')[0]}" if stage == "shard" else stage, 0.0, took
+        if log and log.begun:
+            elapsed = (datetime.now(UTC) - log.begun).total_seconds()
+            whole = (log.written - log.begun).total_seconds() / log.progress if log.progress else took
+        known.append((kind, weight, whole, due, elapsed))
+    ended = [(kind, whole / weight) for kind, weight, whole, _, _ in known if whole is not None]
+    pace = median(rate for _, rate in ended) if ended else pace
+    rates = {kind: median(rate for other, rate in ended if other == kind) for kind in dict(ended)}
+    shared, alone = [0.0], [0.0]
+    for kind, weight, whole, due, elapsed in known:
+        if due:
+            expected = rates.get(kind, pace) * weight if whole is None else whole
+            (alone if kind == "timings" else shared).append(max(0.0, expected - elapsed))
+    return max(sum(shared) / cores, *shared) + sum(alone)
+
+
 def seconds(study: Study) -> dict[Result, float]:
     """Return how long the job of each result of a study takes [s], on a core of the machine that `cost` is of."""
-    found, compiled, cold = dict[Result, float](), set[tuple[str, ...]](), not _is_compiled()
+    found, compiled = dict[Result, float](), set[tuple[str, ...]]()
+    # A loop of runs lies in the folder that `dynamics.compilation` has chosen.
+    cold = not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("simulation_*/*._march-*.nbc"))
     for result in outputs.of(study):
         work, kinds = _work(study, result)
         found[result] = _JOB[result.stage] + _STARTING + work
@@ -75,24 +120,14 @@ def _work(study: Study, result: Result) -> tuple[float, set[tuple[str, ...]]]:
             sweep = study.sweeps[name]
             plan = shards.of(sweep)[part]
             return plan.seconds * (_LATER if plan.round else 1.0), {(sweep.model, contact) for contact in sweep.contact}
-        case "experiment":
-            return _measuring(study.experiments[name], _EXPERIMENT), {("experiment", name)}
-        case "timings":
-            return _measuring(study.timings[name], _TIMING), {("timings", name)}
+        case "experiment" | "timings":
+            timed = result.stage == "timings"
+            asked, table = (study.timings[name], _TIMING) if timed else (study.experiments[name], _EXPERIMENT)
+            choice = asked.options.get("axis", asked.options.get("problem"))
+            return table.get(str(choice), table.get(asked.measure, 0.0)), {(result.stage, name)}
         case "figure" if DRAWINGS[study.figures[name].draw].given != "runs":
             return _DRAWING, set()
     return 0.0, set()
-
-
-def _measuring(planned: Experiment, table: dict[str, float]) -> float:
-    choice = planned.options.get("axis", planned.options.get("problem"))
-    return table.get(str(choice), table.get(planned.measure, 0.0))
-
-
-def _is_compiled() -> bool:
-    """Return whether a loop of runs lies in the folder that `dynamics.compilation` has chosen."""
-    folder = Path(os.environ.get("NUMBA_CACHE_DIR", ""))
-    return any(folder.glob("simulation_*/*._march-*.nbc"))
 
 
 def slowness() -> float:

@@ -1,24 +1,36 @@
-"""What a job's log says: begun, how far, and how it ended; written line by line, and read back.
+"""What a job's log says: begun, how far, what was made, and how it ended; written line by line, and read back.
 
 A log that has no last word is of a job that is still running, or of one that was killed. Logs are side files, so times
-and hosts are told here and in no result.
+and hosts are told here and in no result. The digests in them tell whether a file is the one that its job made.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
-from stiffdice.errors import StiffdiceError, printable
-from stiffdice.io import host
-from stiffdice.io.text_file import beginning
+from stiffdice.errors import InputError, StiffdiceError, printable
+from stiffdice.io import host, seal, text_file
 
-# Of a log no more than so many bytes are read.
-_MOST = 1 << 20
+# Bytes that are read, of a log and of a benchmark file (two lines of numbers); digits that are kept of a digest.
+_MOST, _LARGEST_BENCHMARK, _DIGITS = 1 << 20, 10_000, 16
+
+# Lines: what the job was asked (`outputs.Asked`); a file that it made, and its digest; the fraction of the work
+# done; cells and runs in a finished shard; the most memory [MB] held at a time; the seconds of a job that made what it
+# should; the signal that told it to stop. `begun` and `failed` are below.
+asked = "asked: {}".format
+made = "made: {} {}".format
+tenth = "{:.0%} of the steps done".format
+cells = "{} cells, {} runs".format
+memory = "memory: {:.0f} MB".format
+done = "done in {:.1f} s".format
+interrupted = "interrupted: told to stop ({})".format
 
 _BEGUN = re.compile(r"^begun (\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ) by process (\d{1,10}) on (.+)$", re.MULTILINE)
 _TENTH = re.compile(r"^(\d{1,3})% of the steps done$", re.MULTILINE)
@@ -26,17 +38,16 @@ _ASKED = re.compile(r"^asked: ([a-z0-9 -]{1,200})$", re.MULTILINE)
 _MADE = re.compile(r"^made: ([A-Za-z0-9_./-]{1,300}) ([0-9a-f]{16})$", re.MULTILINE)
 _CELLS = re.compile(r"^(\d{1,18}) cells, \d+ runs$", re.MULTILINE)
 _END = re.compile(r"^(?:(done) in ([0-9.]{1,18}) s|(failed|interrupted): (.*))$", re.MULTILINE)
-_TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 
 class Told(NamedTuple):
     """What a log says so far.
 
     begun: when (UTC), None if it does not say. process, host: of the job. asked: digests of what it was asked
-    (`provenance.Asked`), empty if it does not say. progress: fraction of the work done. made: digests of the files that
-    the job made (`output_digest.digest_of`), by their paths under results/STUDY. cells: in the finished shard, if it
-    says. ending: `done`, `failed` or `interrupted`; empty without a last word. reason: of an ending that is not `done`,
-    one line. written: when the log was last written to (UTC).
+    (`outputs.Asked`), empty if it does not say. progress: fraction of the work done. made: digests of the files that
+    the job made (`digest_of`), by their paths under results/STUDY. cells: in the finished shard, if it says. ending:
+    `done`, `failed` or `interrupted`; empty without a last word. reason: of an ending that is not `done`, one line.
+    written: when the log was last written to (UTC).
     """
 
     begun: datetime | None
@@ -54,47 +65,12 @@ class Told(NamedTuple):
 
 def begun() -> str:
     """Return the first line of a log: when, and which process on which host."""
-    return f"begun {datetime.now(UTC).strftime(_TIME)} by process {os.getpid()} on {host.name()}"
-
-
-def asked(digests: object) -> str:
-    """Return the line that tells what the job was asked."""
-    return f"asked: {digests}"
-
-
-def made(file: str, digest: str) -> str:
-    """Return the line that tells the digest of a file that the job made."""
-    return f"made: {file} {digest}"
-
-
-def tenth(fraction: float) -> str:
-    """Return the line that tells the fraction of the work done."""
-    return f"{fraction:.0%} of the steps done"
-
-
-def cells(count: int, members: int) -> str:
-    """Return the line that tells what is in a finished shard."""
-    return f"{count} cells, {count * members} runs"
-
-
-def memory(peak: int) -> str:
-    """Return the line that tells the most memory [B] that the job held at a time."""
-    return f"memory: {peak / 1e6:.0f} MB"
-
-
-def done(seconds: float) -> str:
-    """Return the last line of a job that made what it should."""
-    return f"done in {seconds:.1f} s"
+    return f"begun {datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} by process {os.getpid()} on {host.name()}"
 
 
 def failed(error: BaseException) -> str:
     """Return the line that ends a job by an error."""
     return f"failed: {reason_of(error)}"
-
-
-def interrupted(signal: str) -> str:
-    """Return the line that ends a job that was told to stop."""
-    return f"interrupted: told to stop ({signal})"
 
 
 def reason_of(error: BaseException) -> str:
@@ -111,7 +87,7 @@ def reason_of(error: BaseException) -> str:
 
 def text_of(path: Path) -> str:
     """Return the text of a log as far as it is read; raises OSError."""
-    return beginning(path, _MOST).decode("utf-8", "replace")
+    return text_file.beginning(path, _MOST).decode("utf-8", "replace")
 
 
 def read(path: Path) -> Told | None:
@@ -121,9 +97,11 @@ def read(path: Path) -> Told | None:
     except OSError:
         return None
     first, asked, end = (pattern.search(text) for pattern in (_BEGUN, _ASKED, _END))  # a traceback may follow
-    shares, counts = _TENTH.findall(text), _CELLS.findall(text)
+    shares, counts, begun = _TENTH.findall(text), _CELLS.findall(text), None
+    with contextlib.suppress(ValueError):  # month 13
+        begun = datetime.fromisoformat(first[1]) if first else None
     return Told(
-        begun=_time(first[1]) if first else None,
+        begun=begun,
         process=int(first[2]) if first else 0,
         host=printable(first[3]) if first else "",
         asked=asked[1] if asked else "",
@@ -137,22 +115,13 @@ def read(path: Path) -> Told | None:
     )
 
 
-def _time(text: str) -> datetime | None:
-    try:
-        return datetime.strptime(text, _TIME).replace(tzinfo=UTC)
-    except ValueError:  # month 13
+def is_alive(told: Told) -> bool | None:
+    """Return whether the process that began a log still runs, and is not another with its number.
+
+    None if it is of another host, where it cannot be looked for.
+    """
+    if told.begun is None or told.host != host.name():
         return None
-
-
-def is_here(told: Told) -> bool:
-    """Return whether a log was written on this host, so that its process can be looked for."""
-    return told.host == host.name()
-
-
-def is_alive(told: Told) -> bool:
-    """Return whether the process that began a log on this host still runs, and is not another with its number."""
-    if told.begun is None:
-        return False
     started = started_at(told.process)
     return started is not None and started <= told.begun.timestamp() + 2  # both are rounded
 
@@ -171,3 +140,46 @@ def started_at(process: int) -> float | None:
         return None
     except psutil.AccessDenied:
         return 0.0
+
+
+def digest_of(path: Path) -> str:
+    """Return the first digits of a file's SHA-256; empty if it is none that can be read.
+
+    Of an HDF5 file what its seal says, so that a file of any size takes a short read; empty without a seal.
+    """
+    try:
+        if not path.is_file():
+            return ""
+        if path.suffix == ".h5":
+            return (seal.digest_in(path) or "")[:_DIGITS]
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()[:_DIGITS]
+    except OSError:
+        return ""
+
+
+def changed(told: Told, folder: Path, *files: str) -> list[str]:
+    """Return those of some files that are there, but not with the digest that the job's log says, if it says one.
+
+    told: the log; files: relative to `folder`, results/STUDY.
+    """
+    there = (file for file in files if (folder / file).exists())
+    return [file for file in there if told.made.get(file, "none") != digest_of(folder / file)]
+
+
+def reason_of_change(told: Told, files: list[str]) -> str:
+    """Return in words what is wrong with files that `changed` found; empty if it found none."""
+    if not files:
+        return ""
+    if not all(file in told.made for file in files):
+        return "no log says that its job made it"
+    kinds = " and ".join(PurePosixPath(file).suffix for file in files)
+    return f"its {kinds} is not what its job made: another file in its place, or changed by hand"
+
+
+def took(benchmark: Path) -> float | None:
+    """Return the seconds in one of Snakemake's benchmark files, None if there is none that is whole."""
+    try:
+        return float(text_file.text_of(benchmark, _LARGEST_BENCHMARK).splitlines()[1].split("\t")[0])
+    except (InputError, ValueError, IndexError):
+        return None

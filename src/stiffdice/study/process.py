@@ -21,9 +21,6 @@ def end_with_parent(name: str) -> None:
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() == _INIT and name not in _command_of(_INIT):
+        inherited = os.getppid() == _INIT
+        if inherited and name not in Path(f"/proc/{_INIT}/cmdline").read_text(encoding="utf-8", errors="replace"):
             os.kill(os.getpid(), signal.SIGKILL)
-
-
-def _command_of(process: int) -> str:
-    return Path(f"/proc/{process}/cmdline").read_text(encoding="utf-8", errors="replace")

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stiffdice.dynamics.kernel_cache import NotStoredError, only_stored
+from stiffdice.dynamics.compilation import NotStoredError, only_stored
 from stiffdice.errors import StiffdiceError
 from stiffdice.scene import scene as scenes
-from stiffdice.scene.scene import Scene
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import simulate
-from stiffdice.study.config import PlannedRun, Study
+from stiffdice.study.config import Study
 
 _MEMBERS = 4  # of a cell: so many go side by side
 _DURATION = 1e-6  # s: in which no cube that is thrown reaches the ground
@@ -34,17 +33,19 @@ def load_kernels(study: Study, root: Path = Path()) -> Iterator[None]:
             if planned.simulator == OURS and kernels not in seen:
                 seen.add(kernels)
                 with _only_loading():
-                    _trajectory(scene, planned)
+                    run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
+                    if planned.scheme in energy_budget.BOOKED:
+                        energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
                 yield
     for sweep in study.sweeps.values():
         for law in sweep.contact if sweep.simulator == OURS else ():
+            scene, criteria = replace(sweep.scene.with_ground(contact=law), duration=_DURATION), sweep.criteria
             with _only_loading():
-                _cell(
-                    dataclasses.replace(sweep.scene.with_ground(contact=law), duration=_DURATION),
-                    sweep.model,
-                    sweep.scheme,
-                    sweep.criteria,
-                )
+                launches = turned(scene, sweep.model, _MEMBERS)
+                compared = references(scene, sweep.model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
+                members = phased(scene, sweep.model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
+                asked: dict[str, Any] = {"criteria": criteria, "stop": criteria, "references": compared}
+                simulate(scene, model=sweep.model, scheme=sweep.scheme, steps=1, members=members, **asked)
             yield
 
 
@@ -53,17 +54,3 @@ def _only_loading() -> Iterator[None]:
     """End the block where it would compile; and where the scene is such that its jobs fail, which they tell."""
     with contextlib.suppress(NotStoredError, StiffdiceError), only_stored():
         yield
-
-
-def _trajectory(scene: Scene, planned: PlannedRun) -> None:
-    run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
-    if planned.scheme in energy_budget.BOOKED:
-        energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
-
-
-def _cell(scene: Scene, model: str, scheme: str, criteria: Mapping[str, float]) -> None:
-    launches = turned(scene, model, _MEMBERS)
-    compared = references(scene, model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
-    members = phased(scene, model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
-    asked: dict[str, Any] = {"criteria": criteria, "stop": criteria, "references": compared}
-    simulate(scene, model=model, scheme=scheme, steps=1, members=members, **asked)

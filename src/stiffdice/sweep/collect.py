@@ -44,24 +44,23 @@ def collect(
         digests.append(cell_digests(part))
     if pattern is None:
         raise InputError("there are no shards; nothing to collect")
-    asked = dataset.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}
-    return _sorted(pattern, columns).assign_attrs(
-        asked,
-        title="Sweep of stiffness and steps",
-        runs_digest=runs_digest(digests),
-        judging_code_digest=code_digest("stiffdice.sweep.collect"),
-    )
-
-
-def _sorted(pattern: xr.Dataset, columns: dict[str, list[npt.NDArray[Any]]]) -> xr.Dataset:
-    """Return all cells, sorted, in the variables of a dataset of none; empties `columns`: none is to be there twice."""
     order = np.lexsort([np.concatenate(columns[key]) for key in ("steps", "stiffness", "contact")])
     whole = dict(pattern.variables)
-    for name in list(columns):
+    for name in list(columns):  # emptied meanwhile: none is to be there twice
         dims, attributes = whole[name].dims, whole[name].attrs
         axis = dims.index("cell")
         whole[name] = xr.Variable(dims, np.concatenate(columns.pop(name), axis).take(order, axis), attributes)
-    return xr.Dataset(whole, attrs=pattern.attrs).set_coords(list(pattern.coords))
+    asked = dataset.config_attributes("sweep", config) if config is not None else {"kind": "sweep"}
+    return (
+        xr.Dataset(whole, attrs=pattern.attrs)
+        .set_coords(list(pattern.coords))
+        .assign_attrs(
+            asked,
+            title="Sweep of stiffness and steps",
+            runs_digest=runs_digest(digests),
+            judging_code_digest=code_digest("stiffdice.sweep.collect"),
+        )
+    )
 
 
 def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
@@ -77,7 +76,9 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     }
     for name in (criteria.CRITERIA[criterion].MEASURE for criterion in tolerances):
         long_name = f"of all members: {dataset.MEASURE_ATTRIBUTES[name]['long_name']}"
-        values[f"largest_{name}"] = "cell", _largest(measures[name]), {"long_name": long_name, "units": "1"}
+        numbers = np.where(np.isnan(measures[name]), -np.inf, measures[name]).max(axis=1)
+        largest = np.where(np.isneginf(numbers), np.nan, numbers)  # not-a-number only where all members are
+        values[f"largest_{name}"] = "cell", largest, {"long_name": long_name, "units": "1"}
     values |= {name: runs[name].values for name in dataset.CELL_ATTRIBUTES}
     values |= {
         "criterion": np.arange(len(tolerances), dtype=np.int8),
@@ -85,9 +86,3 @@ def _judged(runs: xr.Dataset, tolerances: Mapping[str, float]) -> xr.Dataset:
     }
     attributes = dict(runs.attrs) | {"members": runs.sizes["member"]}
     return schema.dataset("sweep", values, MEANINGS | {"criterion": list(tolerances)}, attributes)
-
-
-def _largest(measure: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return the largest of the members, shape (cell,); not-a-number only where all are."""
-    numbers = np.where(np.isnan(measure), -np.inf, measure).max(axis=1)
-    return np.asarray(np.where(np.isneginf(numbers), np.nan, numbers))

@@ -11,50 +11,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from stiffdice.dynamics.state import TOUCHING, TURNING, Array
 from stiffdice.simulation.backend import DEFAULT_SCHEME, OURS
 from stiffdice.sweep.grid import Piece, Sweep
 
-Index = npt.NDArray[np.int64]
-
-
-class Price(NamedTuple):
-    """Seconds of a step of a cube that keeps its orientation, and of one that turns; and of the start of a run."""
-
-    moving: float
-    turning: float
-    start: float = 1e-5
-
-    def step(self, model: str) -> float:
-        """Return the seconds of a step of a model."""
-        return self.turning if model in TURNING else self.moving
-
-
-# Of engines and of our own schemes, on one core of an AMD EPYC (Zen 5) at 3.9 GHz; OTHER: of any that is not here.
+# Seconds of a step of a cube that keeps its orientation, and of one that turns; and of the start of a run. Of engines
+# and of our own schemes, on one core of an AMD EPYC (Zen 5) at 3.9 GHz; OTHER: of any that is not here.
 PRICES = {
-    "symplectic_euler": Price(9e-8, 1.2e-7),
-    "forward_euler": Price(7.5e-8, 1.6e-7),
-    "velocity_verlet": Price(1.2e-7, 2.6e-7),
-    "rk4": Price(2.3e-7, 5.8e-7),
-    "implicit_euler": Price(1.3e-6, 1.9e-6),
-    "exact": Price(1.1e-6, 1.1e-6),
-    "event": Price(1.8e-6, 2.9e-6),
-    "mujoco": Price(2.5e-6, 2.8e-6, 2.2e-3),
-    "pybullet": Price(6.5e-6, 7e-6, 2.5e-2),
-    "drake": Price(2.8e-5, 3e-5, 5e-3),
-    "scipy": Price(1e-7, 1e-7, 5e-2),
-    "octave": Price(1.6e-4, 2.2e-4, 3e-3),
-    "numpy": Price(1.8e-5, 5.8e-5, 1e-4),
+    "symplectic_euler": (9e-8, 1.2e-7, 1e-5),
+    "forward_euler": (7.5e-8, 1.6e-7, 1e-5),
+    "velocity_verlet": (1.2e-7, 2.6e-7, 1e-5),
+    "rk4": (2.3e-7, 5.8e-7, 1e-5),
+    "implicit_euler": (1.3e-6, 1.9e-6, 1e-5),
+    "exact": (1.1e-6, 1.1e-6, 1e-5),
+    "event": (1.8e-6, 2.9e-6, 1e-5),
+    "mujoco": (2.5e-6, 2.8e-6, 2.2e-3),
+    "pybullet": (6.5e-6, 7e-6, 2.5e-2),
+    "drake": (2.8e-5, 3e-5, 5e-3),
+    "scipy": (1e-7, 1e-7, 5e-2),
+    "octave": (1.6e-4, 2.2e-4, 3e-3),
+    "numpy": (1.8e-5, 5.8e-5, 1e-4),
 }
-OTHER = Price(1e-6, 2e-6, 1e-3)
+OTHER = (1e-6, 2e-6, 1e-3)
 
 # Of the default scheme, a step that is compared with no reference; the same, of a member beside others in drag.
-UNSEEN, ASIDE = Price(2e-8, 4.5e-8), Price(1.8e-9, 8.5e-9)
+UNSEEN, ASIDE = (2e-8, 4.5e-8), (1.8e-9, 8.5e-9)
 
 FEWEST = 4  # members that go beside each other
 
@@ -83,33 +67,6 @@ ALIKE, MOST = 0.1, 100
 _PI = 3.141592653589793
 
 
-class _Ball(NamedTuple):
-    """How a cube bounces on the grounds of some columns; all but `pull` have the shape (column,).
-
-    pull [m/s²], drag [1/s]: of a fall. omega [1/s], touch [s]: of a landing. kept: the part of the speed that a landing
-    gives back. climb [s]: until the first fall. first [s], speed [m/s]: when the first landing is, and how fast.
-    """
-
-    pull: float
-    drag: Array
-    omega: Array
-    kept: Array
-    touch: Array
-    climb: float
-    first: Array
-    speed: Array
-
-
-class _Course(NamedTuple):
-    """How long [s] runs rise, fall, touch and rest up to some time, and how often they land; shape (column,)."""
-
-    rising: Array
-    falling: Array
-    touching: Array
-    resting: Array
-    landings: Array
-
-
 def of(sweep: Sweep, pieces: Sequence[Piece]) -> Array:
     """Return the predicted seconds of each cell of some pieces, piece by piece, shape (cell,).
 
@@ -119,19 +76,27 @@ def of(sweep: Sweep, pieces: Sequence[Piece]) -> Array:
     steps = np.array([steps for piece in pieces for steps in piece.steps], np.float64)
     column = np.repeat(np.arange(len(pieces)), counts)
     compared = min(sweep.horizon, sweep.scene.duration) if "trajectory" in sweep.criteria else 0.0
+    default = (sweep.simulator, sweep.scheme) == (OURS, DEFAULT_SCHEME)
+    aside = default and sweep.members >= FEWEST and compared == 0.0
     blocks = -(-sweep.members // MEMBERS)
     # At the extremes a time or a speed leaves the range of doubles: then a run is one of all its steps.
     with np.errstate(all="ignore"):
-        ball = _ball(sweep, pieces)
-        work = _run(sweep, ball, column, steps, compared)
+        ball, course = _bounces(sweep, pieces, np.array([[compared], [sweep.scene.duration]]), aside)
+        work = _run(sweep, compared, aside, steps, ball[:, column], course[..., column])
         if compared:
             launches = sweep.members if sweep.model in TURNING else 1.0
-            contacts = np.fmin(_course(ball, compared).landings, LOOKS)
+            contacts = np.fmin(course[-1, 0], LOOKS)
             work = work + ((REFERENCE + CONTACT * contacts) * launches / counts / sweep.members)[column]
     return np.asarray(CELL + blocks * BLOCK + sweep.members * work)
 
 
-def _ball(sweep: Sweep, pieces: Sequence[Piece]) -> _Ball:
+def _bounces(sweep: Sweep, pieces: Sequence[Piece], until: Array, aside: bool) -> tuple[Array, Array]:
+    """Return how a cube bounces on the ground of each piece, and for how long it does what `until` [s], shape (2, 1).
+
+    Of the ball, shape (4, column): drag [1/s], ω [1/s], the part of the speed that a landing gives back, and when the
+    first is [s]. Of its course, shape (4, 2, column): times [s] that are stepped through, that can be skipped, and of
+    rest; and the number of landings.
+    """
     scene, turning = sweep.scene, sweep.model in TURNING
     ground, launch, normal = scene.ground, scene.launch, scene.ground.normal
     stiffness = np.array([piece.column.stiffness for piece in pieces], np.float64)
@@ -147,10 +112,29 @@ def _ball(sweep: Sweep, pieces: Sequence[Piece]) -> _Ball:
     climb = np.float64(upwards) / pull
     fall, speed = _fall(pull, drag, clearance + 0.5 * climb * upwards)
     lands = (stiffness > 0.0) & (sweep.model in TOUCHING) & (pull > 0.0)
-    first = np.where(lands, np.fmax(0.0, climb + fall), math.inf)
+    first, climb = np.where(lands, np.fmax(0.0, climb + fall), math.inf), np.float64(max(0.0, climb))
     if turning:
         kept, touch, speed = kept / (1 + RUBBED * min(1.0, ground.friction)), CORNERS * touch, UPWARDS * speed
-    return _Ball(pull, drag, omega, kept, touch, max(0.0, climb), first, speed)
+    time, rising = np.fmin(first, until), np.fmin(climb, until)
+    falling, resting, landings = np.fmax(0.0, time - climb), np.zeros(time.shape), np.zeros(time.shape)
+    for _ in range(MOST):
+        going = time < until
+        if not going.any():
+            break
+        leaving = speed * kept
+        rise = leaving / pull
+        drop, again = _fall(pull, drag, 0.5 * rise * leaving)
+        lost, whole = 1 - again / speed, touch + rise + drop
+        # Slower than that it does not get out of the sag of its rest.
+        rests = going & ~(leaving * omega > pull)
+        alike = np.where(going & ~rests, np.fmin((until - time) / whole, np.fmax(1.0, ALIKE / lost)), 0.0)
+        landings = landings + alike + rests
+        resting = np.where(rests, until - time, resting)
+        rising, falling = rising + alike * rise, falling + alike * drop
+        time, speed = np.where(rests, until, time + alike * whole), speed - alike * lost * speed
+    slow = np.where(drag > 0.0, falling + (rising if aside or turning else 0.0), 0.0)
+    course = np.stack([landings * touch + slow, rising + falling - slow, resting, landings])
+    return np.stack([drag, omega, kept, first]), course
 
 
 def _dot(p: Sequence[float], q: Sequence[float]) -> float:
@@ -169,91 +153,39 @@ def _fall(pull: float, drag: Array, height: Array) -> tuple[Array, Array]:
     return (speed + drag * height) / pull, speed
 
 
-def _course(ball: _Ball, until: float) -> _Course:
-    time, speed = np.fmin(ball.first, until), ball.speed
-    rising = np.full(time.shape, min(ball.climb, until))
-    falling, resting, landings = np.fmax(0.0, time - ball.climb), np.zeros(time.shape), np.zeros(time.shape)
-    for _ in range(MOST):
-        going = time < until
-        if not going.any():
-            break
-        leaving = speed * ball.kept
-        rise = leaving / ball.pull
-        drop, again = _fall(ball.pull, ball.drag, 0.5 * rise * leaving)
-        lost, whole = 1 - again / speed, ball.touch + rise + drop
-        # Slower than that it does not get out of the sag of its rest.
-        rests = going & ~(leaving * ball.omega > ball.pull)
-        alike = np.where(going & ~rests, np.fmin((until - time) / whole, np.fmax(1.0, ALIKE / lost)), 0.0)
-        landings = landings + alike + rests
-        resting = np.where(rests, until - time, resting)
-        rising, falling = rising + alike * rise, falling + alike * drop
-        time, speed = np.where(rests, until, time + alike * whole), speed - alike * lost * speed
-    return _Course(rising, falling, landings * ball.touch, resting, landings)
-
-
-def _run(sweep: Sweep, ball: _Ball, column: Index, steps: Array, compared: float) -> Array:
-    """Return the seconds of one run of each cell, shape (cell,)."""
-    duration, ours = sweep.scene.duration, sweep.simulator == OURS
-    price = PRICES.get(sweep.scheme if ours else sweep.simulator, OTHER)
-    seen, h = price.step(sweep.model), duration / steps
-    default = ours and sweep.scheme == DEFAULT_SCHEME
-    course, known = _course(ball, duration), np.full(h.shape, math.inf)
-    rests = (duration - course.resting)[column]
-    if default and sweep.model not in TURNING:
-        known = _known(sweep, ball, rests, column, h)
-    ends = _ends(sweep, ball, course, column, h, compared, known) if sweep.early_stop else np.full(h.shape, duration)
+def _run(sweep: Sweep, compared: float, aside: bool, steps: Array, ball: Array, course: Array) -> Array:
+    """Return the seconds of one run of each cell, shape (cell,); ball, course: as of `_bounces`, by cell."""
+    (drag, omega, kept, first), (stepped, skipped, (_, resting), landings) = ball, course
+    duration, ours, turning = sweep.scene.duration, sweep.simulator == OURS, sweep.model in TURNING
+    *prices, start = PRICES.get(sweep.scheme if ours else sweep.simulator, OTHER)
+    seen, h, default = prices[turning], duration / steps, ours and sweep.scheme == DEFAULT_SCHEME
+    omega_h, rests, known = omega * h, duration - resting, np.full(h.shape, math.inf)
+    if default and not turning:  # from when on [s] a cube is known to rest
+        decay = np.float64(sweep.scene.ground.damping / sweep.scene.cube.mass)
+        grows = SWING_GROWS * duration * np.where(drag > 0.0, 8.0, 4.0) * decay * omega_h * omega_h
+        is_known = (rests < duration) & (omega_h <= LONGEST_HELD) & (grows <= SWING_SHRINKS)
+        known = np.where(is_known, rests + (1.0 + grows) / (4.0 * decay), math.inf)
+    ends = np.full(h.shape, duration)
+    if sweep.early_stop and "finite" not in sweep.criteria:  # once the last criterion fails, or can fail no more
+        gain, lost = GAIN * omega_h * omega_h, 1 - kept * kept
+        between, last = (duration - first) / np.fmax(1.0, landings[1]), np.full(h.shape, compared)
+        for tolerance in (tolerance for name, tolerance in sweep.criteria.items() if name != "trajectory"):
+            fails = np.where(gain > lost, first + between * UNTIL_FAILED * (tolerance + lost) / gain, math.inf)
+            last = np.fmax(last, np.fmin(known, fails))
+        ends = np.fmin(duration, np.fmax(last, h))
     if not ours:
-        return np.asarray(price.start + seen * np.fmin(steps, ends / h))
-    aside = default and sweep.members >= FEWEST and compared == 0.0
-    before, whole = (_stepped(sweep, ball, part, aside, column, h) for part in (_course(ball, compared), course))
-    first = np.where(compared / LOOKS >= FEWEST_BETWEEN * h, before + LOOKS, compared / h)
-    late = UNSEEN.step(sweep.model) if default else seen
-    unseen = np.where((ball.drag > 0.0)[column] & aside, ASIDE.step(sweep.model), late)
-    first = np.fmin(compared / h, first * _share(ends, 0.0, compared))
-    later = np.fmax(0.0, whole - before) * _share(ends, compared, rests)
-    later = later + np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h
-    return np.asarray(price.start + seen * first + unseen * np.fmin(steps, later))
+        return np.asarray(start + seen * np.fmin(steps, ends / h))
+    # Of flights that can be skipped some steps around each landing are computed.
+    near, flown = AROUND * landings, skipped / h
+    before, whole = stepped / h + np.where(flown > 0.0, near * flown / (near + flown), 0.0)
+    early = np.where(compared / LOOKS >= FEWEST_BETWEEN * h, before + LOOKS, compared / h)
+    early = np.fmin(compared / h, early * _share(ends, 0.0, compared))
+    late = np.fmax(0.0, whole - before) * _share(ends, compared, rests)
+    late = late + np.fmax(0.0, np.fmin(ends, known) - np.fmax(rests, compared)) / h
+    unseen = np.where((drag > 0.0) & aside, ASIDE[turning], UNSEEN[turning] if default else seen)
+    return np.asarray(start + seen * early + unseen * np.fmin(steps, late))
 
 
 def _share(ends: Array, start: float, end: Array | float) -> Array:
     """Return the part of the time from start to end that is over when runs end."""
     return np.asarray(np.fmin(1.0, np.fmax(0.0, ends - start) / np.fmax(0.0, end - start)))
-
-
-def _stepped(sweep: Sweep, ball: _Ball, course: _Course, aside: bool, column: Index, h: Array) -> Array:
-    """Return the steps that are computed one by one in runs until they rest, shape (cell,).
-
-    Of flights that can be skipped these are some around each landing.
-    """
-    flying = course.rising + course.falling
-    slow = course.falling + (course.rising if aside or sweep.model in TURNING else 0.0)
-    slow = np.where(ball.drag > 0.0, slow, 0.0)
-    near, skipped = (AROUND * course.landings)[column], (flying - slow)[column] / h
-    return np.asarray(
-        (course.touching + slow)[column] / h + np.where(skipped > 0.0, near * skipped / (near + skipped), 0.0)
-    )
-
-
-def _known(sweep: Sweep, ball: _Ball, rests: Array, column: Index, h: Array) -> Array:
-    """Return from when on [s] a cube is known to rest, shape (cell,); infinite if it never is."""
-    scene, omega_h = sweep.scene, ball.omega[column] * h
-    decay = np.float64(scene.ground.damping / scene.cube.mass)
-    dragging = np.where(ball.drag > 0.0, 8.0, 4.0)[column]
-    grows = SWING_GROWS * scene.duration * dragging * decay * omega_h * omega_h
-    known = (rests < scene.duration) & (omega_h <= LONGEST_HELD) & (grows <= SWING_SHRINKS)
-    return np.where(known, rests + (1.0 + grows) / (4.0 * decay), math.inf)
-
-
-def _ends(sweep: Sweep, ball: _Ball, course: _Course, column: Index, h: Array, compared: float, known: Array) -> Array:
-    """Return when [s] the last criterion is decided, shape (cell,): it fails, or can fail no more."""
-    duration, criteria = sweep.scene.duration, sweep.criteria
-    if "finite" in criteria:
-        return np.full(h.shape, duration)
-    omega_h = ball.omega[column] * h
-    gain, lost = GAIN * omega_h * omega_h, (1 - ball.kept * ball.kept)[column]
-    first, between = ball.first[column], ((duration - ball.first) / np.fmax(1.0, course.landings))[column]
-    last = np.full(h.shape, compared)
-    for tolerance in (tolerance for name, tolerance in criteria.items() if name != "trajectory"):
-        fails = np.where(gain > lost, first + between * UNTIL_FAILED * (tolerance + lost) / gain, math.inf)
-        last = np.fmax(last, np.fmin(known, fails))
-    return np.asarray(np.fmin(duration, np.fmax(last, h)))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.model_selection import AS_ASKED
@@ -36,7 +35,7 @@ class Piece(NamedTuple):
     steps: tuple[int, ...]
 
 
-@dataclass(frozen=True, eq=False)  # itself alone, so that its plan can be kept
+@dataclass(frozen=True, eq=False, kw_only=True)  # itself alone, so that its plan can be kept
 class Sweep:
     """A grid of stiffness and steps.
 
@@ -54,13 +53,13 @@ class Sweep:
     scheme: str
     contact: tuple[str, ...]
     stiffness: Spans
-    steps: Spans | None
-    omega_h: Spans | None
+    steps: Spans | None = None
+    omega_h: Spans | None = None
     members: int
-    seed: int
-    refine: int
+    seed: int = 0
+    refine: int = 0
     criteria: Mapping[str, float]
-    early_stop: bool
+    early_stop: bool = True
     horizon: float
     seconds_per_job: float | None = None
     model_reason: str = AS_ASKED
@@ -82,23 +81,23 @@ class Sweep:
         return [Column(contact, stiffness) for contact in self.contact for stiffness in stiffnesses]
 
     @property
-    def _grid(self) -> Spans:
+    def _grid(self) -> Sequence[Span]:
         """The spans of steps, given as counts or as ωh."""
         grid = self.omega_h if self.steps is None else self.steps
         assert grid is not None, "the schema asks for one of them"
-        return grid
+        return _each(grid)
 
     def step_range(self, stiffness: float) -> tuple[float, float]:
         """Return the fewest and the most steps of the grid at one stiffness [kg/s²], not rounded."""
-        ranges = [self._range_of(span, stiffness) for span in _each(self._grid)]
-        return min(first for first, _ in ranges), max(last for _, last in ranges)
+        fewest, most = zip(*(self._range_of(span, stiffness) for span in self._grid), strict=True)
+        return min(fewest), max(most)
 
-    def _range_of(self, span: Span, stiffness: float) -> tuple[float, float]:
-        first, last = float(span["from"]), float(span["to"])  # NumPy has no whole numbers above 2^63
+    def _range_of(self, span: Span, stiffness: float) -> list[float]:
+        ends = [float(span["from"]), float(span["to"])]  # NumPy has no whole numbers above 2^63
         if self.steps is None:
             radians = linear_theory.contact_frequency(stiffness, self.scene.cube.mass) * self.scene.duration
-            first, last = radians / first, radians / last
-        return min(first, last), max(first, last)
+            ends = [radians / end for end in ends]
+        return sorted(ends)
 
     def scan(self, column: Column) -> list[int]:
         """Return the step counts first tried in a column: spread evenly in their logarithm, jittered within each part.
@@ -111,13 +110,13 @@ class Sweep:
 
     def whole_scan(self, column: Column) -> list[int]:
         """Return all step counts of a column's grid, ascending; a sweep with `reach` tries some of them."""
-        return sorted({steps for span in _each(self._grid) for steps in self._scan_of(span, column)})
-
-    def _scan_of(self, span: Span, column: Column) -> set[int]:
-        low, high = np.log(self._range_of(span, column.stiffness))
-        count = int(span["count"])
-        part = (np.arange(count) + self._jitter(column, 0).random(count)) / count
-        return {max(1, round(float(steps))) for steps in np.exp(low + (high - low) * part)}
+        found = set[int]()
+        for span in self._grid:
+            low, high = np.log(self._range_of(span, column.stiffness))
+            count = int(span["count"])
+            part = (np.arange(count) + self._jitter(column, 0).random(count)) / count
+            found |= {max(1, round(steps)) for steps in np.exp(low + (high - low) * part).tolist()}
+        return sorted(found)
 
     def finer(self, column: Column, scanned: Sequence[int], passing: Array, rounds: int) -> list[int]:
         """Return step counts to add to a scan: one between any two neighbours whose members do not all agree.
@@ -126,28 +125,19 @@ class Sweep:
         """
         clear = (passing[:, 1:] == passing[:, :-1]) & ((passing[:, 1:] == 0) | (passing[:, 1:] == 1))
         unclear = np.flatnonzero(~clear.all(axis=0))
-        if self.reach is not None:
-            return self._nearby(column, scanned, unclear, rounds)
-        place = 0.25 + 0.5 * self._jitter(column, rounds).random(len(unclear))
         places = np.log(scanned)
-        low, high = places[:-1][unclear], places[1:][unclear]
-        added = {round(float(steps)) for steps in np.exp(low + (high - low) * place)}
-        return sorted(added - set(scanned))
-
-    def _nearby(self, column: Column, scanned: Sequence[int], unclear: npt.NDArray[np.int64], rounds: int) -> list[int]:
-        """Return one in 2^(refine − rounds) of the grid's cells wherever neighbours lie within reach of unclear ones.
-
-        There even two neighbours that both have all passing may have a cell between them that fails.
-        """
-        assert self.reach is not None
-        places, reach = np.log(scanned), np.log(self.reach)
-        low, high = places[:-1, None], places[1:, None]
-        near = ((high >= places[:-1][unclear] - reach) & (low <= places[1:][unclear] + reach)).any(axis=1)
-        whole = self.whole_scan(column)
-        index = np.searchsorted(whole, scanned)
-        stride = 2 ** (self.refine - rounds)
-        added = {whole[k] for i in np.flatnonzero(near) for k in range(index[i], index[i + 1], stride)}
-        return sorted(added - set(scanned))
+        low, high = places[:-1], places[1:]
+        if self.reach is None:
+            place = 0.25 + 0.5 * self._jitter(column, rounds).random(len(unclear))
+            between = np.exp(low[unclear] + (high[unclear] - low[unclear]) * place)
+            return sorted({round(steps) for steps in between.tolist()} - set(scanned))
+        # One in 2^(refine − rounds) of the grid's cells wherever neighbours lie within reach of unclear ones: even two
+        # that both have all passing may there have a cell between them that fails.
+        reach, whole = np.log(self.reach), self.whole_scan(column)
+        near = (high[:, None] >= low[unclear] - reach) & (low[:, None] <= high[unclear] + reach)
+        index, stride = np.searchsorted(whole, scanned), 2 ** (self.refine - rounds)
+        starts = np.flatnonzero(near.any(axis=1))
+        return sorted({whole[k] for i in starts for k in range(index[i], index[i + 1], stride)} - set(scanned))
 
     def _jitter(self, column: Column, rounds: int) -> np.random.Generator:
         key = int.from_bytes(hashlib.sha256(repr(column.stiffness).encode()).digest()[:8])
@@ -156,25 +146,16 @@ class Sweep:
     @property
     def of_runs(self) -> dict[str, Any]:
         """What a run depends on besides its cell, the scene and the code, as plain data."""
-        config: dict[str, Any] = {
-            "model": self.model,
-            "model_reason": self.model_reason,
-            "simulator": self.simulator,
-            "scheme": self.scheme,
-            "members": self.members,
-            "hop_height": self.hop_height,
-        }
-        if "trajectory" in self.criteria:
-            config["horizon"] = self.horizon
+        names = ["model", "model_reason", "simulator", "scheme", "members", "hop_height"]
+        names += ["horizon"] if "trajectory" in self.criteria else []
+        config = {name: getattr(self, name) for name in names}
         # Other tolerances need other runs only where a run stops because of them.
-        if self.early_stop:
-            config |= {"criteria": dict(self.criteria), "early_stop": True}
-        return config
+        return config | ({"criteria": dict(self.criteria), "early_stop": True} if self.early_stop else {})
 
     @property
     def of_cells(self) -> dict[str, Any]:
         """What the places of cells depend on besides columns, scene and code: by themselves, and by what was found."""
-        spans = [dict(span) for span in _each(self._grid)]
+        spans = [dict(span) for span in self._grid]
         grid: dict[str, Any] = {"omega_h" if self.steps is None else "steps": spans if len(spans) > 1 else spans[0]}
         if self.reach is not None:  # every round's cells then depend on how many rounds there are
             grid |= {"refine": self.refine, "reach": self.reach}

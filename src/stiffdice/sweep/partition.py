@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import groupby, pairwise
 from types import MappingProxyType
@@ -56,9 +56,8 @@ def of(sweep: Sweep) -> Mapping[str, Shard]:
     costs = cost_model.of(sweep, first)
     total = float(np.cumsum(costs)[-1])
     work = sweep.seconds_per_job or max(FEWEST_SECONDS, min(SECONDS, total / JOBS))
-    cut = _cut_at_multiples(first, costs, work)
     shards = {}
-    for part, (pieces, seconds) in enumerate(cut):
+    for part, (pieces, seconds) in enumerate(_cut_at_multiples(first, costs, work)):
         shards[_digest(sweep, sweep.of_runs, pieces)] = Shard(0, part, seconds, pieces)
     columns = [piece.column for piece in first]
     expected, most = _FIRST_REFINEMENT * total, len(costs)
@@ -89,12 +88,10 @@ def refined(sweep: Sweep, survey: xr.Dataset, number: int) -> list[Piece]:
     contact, stiffness, steps = (survey[name].values for name in ("contact", "stiffness", "steps"))
     for column in sweep.columns():
         law = list(CONTACT_LAWS).index(column.contact)
-        here = slice(*np.searchsorted(contact, [law, law + 1]))
-        low, high = (
-            here.start + np.searchsorted(stiffness[here], column.stiffness, side) for side in ("left", "right")
-        )
-        due = sweep.finer(column, steps[low:high].tolist(), passing[:, low:high], number)
-        if due:
+        first, end = np.searchsorted(contact, [law, law + 1])
+        inside = stiffness[first:end]
+        here = slice(*(first + np.searchsorted(inside, column.stiffness, side) for side in ("left", "right")))
+        if due := sweep.finer(column, steps[here].tolist(), passing[:, here], number):
             pieces.append(Piece(column, tuple(due)))
     return pieces
 
@@ -112,23 +109,20 @@ def share(sweep: Sweep, pieces: Sequence[Piece], parts: int) -> list[tuple[Piece
     return _dealt(pieces, np.minimum(numbers, parts - 1), parts)
 
 
-def _cut_at_multiples(pieces: Sequence[Piece], costs: Array, work: float) -> list[tuple[tuple[Piece, ...], float]]:
-    """Return pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done.
+def _cut_at_multiples(pieces: Sequence[Piece], costs: Array, work: float) -> Iterator[tuple[tuple[Piece, ...], float]]:
+    """Yield pieces in parts, each with its cost: a new one with every contact law, and whenever `work` more is done.
 
     What is left at the end of a law, if it is less than half of that, is done with the part before.
     """
-    found, start = list[tuple[tuple[Piece, ...], float]](), 0
     for _, of_law in groupby(pieces, lambda piece: piece.column.contact):
         here = list(of_law)
-        end = start + sum(len(piece.steps) for piece in here)
-        seconds, start = costs[start:end], end
+        seconds, costs = np.split(costs, [sum(len(piece.steps) for piece in here)])
         reached = np.cumsum(seconds)
         last = max(0.0, np.floor(reached[-1] / work + 0.5) - 1)
         multiples = np.fmin(np.floor((reached - seconds / 2) / work), last)
         _, numbers = np.unique(multiples, return_inverse=True)  # as many parts as cells, however dear these are
-        parts = int(numbers[-1]) + 1
-        found += zip(_dealt(here, numbers, parts), np.bincount(numbers, seconds).tolist(), strict=True)
-    return found
+        dealt = _dealt(here, numbers, int(numbers[-1]) + 1)
+        yield from zip(dealt, np.bincount(numbers, seconds).tolist(), strict=True)
 
 
 def _dealt(pieces: Sequence[Piece], numbers: npt.NDArray[np.int64], parts: int) -> list[tuple[Piece, ...]]:

@@ -6,7 +6,7 @@ whichever cell chance put last. What they may differ by is told from the dense s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import product
 from typing import NamedTuple
 
@@ -139,15 +139,13 @@ def common(sweeps: Mapping[str, xr.Dataset]) -> list[Column]:
         )
         if asked != wanted:
             raise InputError(f"refinement-check: sweep {name} has other criteria than the first, or tolerances")
-    found_in = [scans(found) for found in sweeps.values()]
-    shared = (column for column in found_in[0] if all(column in parts for parts in found_in))
-    columns = [column for column in shared if _overlap([parts[column] for parts in found_in])]
+    found_in, columns = [scans(found) for found in sweeps.values()], []
+    for column in found_in[0]:
+        steps = [parts[column].steps for parts in found_in if column in parts]
+        # A span of steps in common, and cells enough to tell errors from.
+        overlap = max(scan[0] for scan in steps) < min(scan[-1] for scan in steps)
+        if len(steps) == len(found_in) and min(map(len, steps)) > 2 and overlap:
+            columns.append(column)
     if not columns:
         raise InputError("refinement-check: needs sweeps with a contact law, stiffness and span of steps in common")
     return columns
-
-
-def _overlap(compared: Sequence[Scan]) -> bool:
-    """Return whether scans have a span of steps in common, and cells enough to tell errors from."""
-    ends = [(int(scan.steps[0]), int(scan.steps[-1])) for scan in compared]
-    return min(len(scan.steps) for scan in compared) > 2 and max(low for low, _ in ends) < min(high for _, high in ends)

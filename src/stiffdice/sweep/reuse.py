@@ -7,13 +7,12 @@ scheme and members are used, and of these only what is whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy.typing as npt
-import xarray as xr
 
 from stiffdice.errors import InputError
 from stiffdice.io import reader
@@ -53,11 +52,14 @@ class Kept:
             if path.stem in planned or path.stem in elsewhere:
                 continue
             try:
-                for number, cell in enumerate(_cells_of(path, like)):
+                attributes, cells = reader.head(path, CELL)
+            except InputError as error:  # it cannot be trusted
+                say(f"not used: {error}")
+                continue
+            if not differing(attributes, like.attrs):
+                for number, cell in enumerate(zip(*(cells[name].tolist() for name in CELL), strict=True)):
                     if cell in wanted:
                         self._places.setdefault(cell, (path, number))
-            except InputError as error:
-                say(f"not used: {error}")
         self._held: dict[int, dict[str, npt.NDArray[Any]]] = {}
         self._of: tuple[Path, slice] | None = None
 
@@ -99,10 +101,3 @@ def _elsewhere(table: Path, pieces: Sequence[Piece]) -> set[str]:
         }
     except (InputError, KeyError, ValueError):
         return set()
-
-
-def _cells_of(path: Path, like: xr.Dataset) -> Iterator[Cell]:
-    """Yield the cells of a shard if its runs are those of another; raises InputError if it cannot be trusted."""
-    attributes, cells = reader.head(path, CELL)
-    if not differing(attributes, like.attrs):
-        yield from zip(*(cells[name].tolist() for name in CELL), strict=True)

@@ -113,25 +113,19 @@ def shard_pattern(sweep: Sweep) -> xr.Dataset:
     }
     values |= _cell_values(sweep, sweep.columns()[0], [1])
     values |= {name: np.arange(sizes[name], dtype=values[name].dtype) for name in ("member", "criterion")}
-    attributes = _attributes(sweep, "Runs of a sweep of stiffness and steps")
-    return schema.dataset("shard", values, MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
-
-
-def _attributes(sweep: Sweep, title: str) -> dict[str, Any]:
-    code = "stiffdice.sweep.shard", *backend.code_of(sweep.simulator)
+    title, code = "Runs of a sweep of stiffness and steps", ("stiffdice.sweep.shard", *backend.code_of(sweep.simulator))
     attributes = dataset.provenance_attributes(title, sweep.scene, sweep.model, sweep.scheme, *code)
-    attributes |= dataset.simulator_attributes(sweep.simulator, backend.version_of(sweep.simulator))
+    attributes |= {"simulator": sweep.simulator, "simulator_version": backend.version_of(sweep.simulator)}
     attributes |= dataset.config_attributes("shard", sweep.of_runs)
-    attributes["seed"] = sweep.seed
-    attributes["model_reason"] = sweep.model_reason
-    attributes["scene_note"] = "contact law and stiffness are the cell's, not the scene's"
+    note = "contact law and stiffness are the cell's, not the scene's"
+    attributes |= {"seed": sweep.seed, "model_reason": sweep.model_reason, "scene_note": note}
     attributes["early_stop"] = int(sweep.early_stop)
     if sweep.early_stop:  # otherwise the measures hold for any tolerances
         attributes["criteria"] = dataset.criteria_text(sweep.criteria)
     for name, unit in (("horizon", "s"), ("hop_height", "m")):
         if name in sweep.of_runs:
             attributes |= {name: sweep.of_runs[name], f"{name}_units": unit}
-    return attributes
+    return schema.dataset("shard", values, MEANINGS | {"criterion": list(criteria.CRITERIA)}, attributes)
 
 
 def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Piece]) -> Iterator[xr.Dataset]:
@@ -149,7 +143,14 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
     }
     first = 0
     for part in parts:
-        check_like(part, like)
+        if other := differing(like.attrs, part.attrs):
+            raise RefusedError(f"not the shard planned: other {', '.join(other)}")
+        for name in like.variables.keys() | part.variables.keys():
+            kinds = {(data[name].dims, data[name].dtype) if name in data.variables else None for data in (like, part)}
+            if len(kinds) > 1:
+                raise RefusedError(f"not the shard planned: other variable {name}")
+        if part.sizes["member"] != sweep.members:
+            raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {sweep.members}")
         cells = slice(first, first + part.sizes["cell"])
         for name in CELL:
             if not np.array_equal(part[name].values, planned[name][cells]):
@@ -163,15 +164,3 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
 def differing(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
     """Return the names of attributes that two files of runs do not share."""
     return [key for key in {**ours, **theirs} if str(ours.get(key)) != str(theirs.get(key))]
-
-
-def check_like(part: xr.Dataset, pattern: xr.Dataset) -> None:
-    """Raise RefusedError unless a part of a shard has the attributes and variables of a pattern."""
-    if other := differing(pattern.attrs, part.attrs):
-        raise RefusedError(f"not the shard planned: other {', '.join(other)}")
-    for name in pattern.variables.keys() | part.variables.keys():
-        kinds = {(data[name].dims, data[name].dtype) for data in (pattern, part) if name in data.variables}
-        if len(kinds) > 1 or not (name in pattern.variables and name in part.variables):
-            raise RefusedError(f"not the shard planned: other variable {name}")
-    if part.sizes["member"] != pattern.sizes["member"]:
-        raise RefusedError(f"not the shard planned: {part.sizes['member']} members, not {pattern.sizes['member']}")

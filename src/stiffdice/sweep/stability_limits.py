@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -115,40 +115,25 @@ def find(sweep: xr.Dataset) -> xr.Dataset:
     """Return the frontier of a collected sweep by contact law, criterion and stiffness; and the scan, by cell."""
     steps, passes = sweep.steps.values, sweep.failing.values == 0
     laws, stiffnesses, cells = scans(sweep.contact.values, sweep.stiffness.values, steps)
-
-    def by_column(values: Sequence[Any]) -> npt.NDArray[Any]:
-        """values: shape (criterion, column)."""
-        return np.array(values).reshape(len(passes), len(laws), len(stiffnesses)).swapaxes(0, 1)
-
-    of_scans = [[edges(steps[scan], row[scan]) for scan in cells] for row in passes]
-    found = {name: by_column([[part[name] for part in row] for row in of_scans]) for name in (*EDGES, "flips")}
-    first, last = (by_column(passes[:, [scan[end] for scan in cells]]) for end in (0, -1))
+    shape = len(passes), len(laws), len(stiffnesses)
+    of_scans = [[list(edges(steps[scan], row[scan]).values()) for scan in cells] for row in passes]
+    found = np.array(of_scans).reshape(*shape, -1).transpose(3, 1, 0, 2)
+    first, last = (passes[:, [scan[end] for scan in cells]].reshape(shape).swapaxes(0, 1) for end in (0, -1))
     # An edge at the end of its scan is only a bound; a fit would take it for a measurement.
-    measured = zip(EDGES, (~first, last, last), strict=True)
-    rows = np.stack([np.where(inside, found[edge], np.nan) for edge, inside in measured], axis=2)
+    rows = np.where(np.stack([~first, last, last]), found[:-1], np.nan)
     fits = np.apply_along_axis(lambda row: list(power_law(stiffnesses, row).values()), -1, rows)
-    return _dataset(sweep, laws, stiffnesses, found | dict(zip(FIT, np.moveaxis(fits, -1, 0), strict=True)))
-
-
-def _dataset(
-    sweep: xr.Dataset, laws: npt.NDArray[np.int8], stiffnesses: Values, found: Mapping[str, Values]
-) -> xr.Dataset:
-    scene = scenes.from_mapping(json.loads(sweep.attrs["scene"]))
-    limits = [
-        linear_theory.steps_for(scene.with_ground(stiffness=value), linear_theory.STABILITY_LIMIT)
-        for value in stiffnesses
-    ]
-    members = int(sweep.attrs["members"])
+    scene, members = scenes.from_mapping(json.loads(sweep.attrs["scene"])), int(sweep.attrs["members"])
+    grounds = (scene.with_ground(stiffness=value) for value in stiffnesses)
     passing = members - sweep.failing.values.astype(np.int64)
     low, high = confidence(passing, members)
     values: dict[str, Any] = {
-        **{name: found[name] for name in (*EDGES, "flips")},
-        "limit": limits,
+        **dict(zip((*EDGES, "flips"), found, strict=True)),
+        "limit": [linear_theory.steps_for(ground, linear_theory.STABILITY_LIMIT) for ground in grounds],
         "pass_fraction": passing / members,
         "pass_fraction_low": low,
         "pass_fraction_high": high,
         "tolerance": sweep.tolerance.values,
-        **{name: found[name] for name in FIT},
+        **dict(zip(FIT, fits.transpose(3, 1, 2, 0), strict=True)),
         "contact": laws,
         "criterion": sweep.criterion.values,
         "edge": np.arange(len(EDGES), dtype=np.int8),

@@ -1,15 +1,19 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 from tests import rounds
 
 from stiffdice.archive.consistency import check as sanity
-from stiffdice.archive.consistency import sweeps
+from stiffdice.archive.consistency import equations
+from stiffdice.archive.verify import verify
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.reader import open_file, parts
+from stiffdice.io.writer import write_dataset
+from stiffdice.report import file_page
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.dataset import run_dataset
@@ -269,20 +273,106 @@ def test_a_cell_cannot_pass_with_more_members_than_fail_nothing(whole):
 
 
 def test_a_sweep_that_is_not_what_its_shards_add_up_to_is_seen(whole):
-    assert sweeps.same_as_collected(whole, whole) == []
+    assert equations.same_as_collected(whole, whole) == []
     count = int(whole.failing[0, 0])
-    found = sweeps.same_as_collected(changed(whole, "failing", (0, 0), lambda n: n - 1), whole)
+    found = equations.same_as_collected(changed(whole, "failing", (0, 0), lambda n: n - 1), whole)
     assert found == [
         f"failing[0, 0] = {count - 1}: allowed is {count}, computed again (1 of {whole.failing.size} values)"
     ]
-    assert sweeps.same_as_collected(whole.drop_vars("failing"), whole) == ["failing: is missing"]
-    assert "'cell': 3}: allowed is" in sweeps.same_as_collected(whole.isel(cell=slice(3)), whole)[0]
+    assert equations.same_as_collected(whole.drop_vars("failing"), whole) == ["failing: is missing"]
+    assert "'cell': 3}: allowed is" in equations.same_as_collected(whole.isel(cell=slice(3)), whole)[0]
 
 
 @pytest.mark.parametrize("name", ["first_pass", "last_fail", "flips", "pass_fraction", "exponent", "factor", "limit"])
 def test_a_frontier_that_does_not_follow_from_its_sweep_is_seen(whole, name):
     found = stability_limits.find(whole)
-    assert sweeps.same_as_found(found, whole) == []
+    assert equations.same_as_found(found, whole) == []
     place = tuple(np.argwhere(found[name].values > 0)[0])
-    assert sweeps.same_as_found(changed(found, name, place, slightly), whole)[0].startswith(name)
-    assert "model = vertical" in sweeps.same_as_found(found.assign_attrs(model="vertical"), whole)[0]
+    assert equations.same_as_found(changed(found, name, place, slightly), whole)[0].startswith(name)
+    assert "model = vertical" in equations.same_as_found(found.assign_attrs(model="vertical"), whole)[0]
+
+
+# The words of enums: a number in a file means what the registries say, whatever words the file has for it.
+
+FORMATS = Path(__file__).parents[2] / "reference" / "formats"
+FILES = sorted(FORMATS.glob("*/*.h5"))
+NEWEST = FORMATS / "1.3"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_files_of_every_version_have_the_words_of_the_registries(path):
+    assert sanity.word_problems(open_file(path)) == []
+
+
+def swapped(dataset, name, first, second):
+    """The same with two words of an enum in each other's place."""
+    other = dataset.copy()
+    text = str(other[name].attrs["flag_meanings"]).split()
+    a, b = text.index(first), text.index(second)
+    text[a], text[b] = second, first
+    other[name].attrs["flag_meanings"] = " ".join(text)
+    return other
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "first", "second"),
+    [
+        ("run", "verdict", "passed", "energy_grew"),
+        ("run", "ending", "passed", "unresolved"),
+        ("run", "axis", "x", "z"),
+        ("run", "bounce_ended", "in_contact", "in_air"),
+        ("shard", "verdict", "passed", "energy_grew"),
+        ("shard", "contact", "gated", "ungated"),
+        ("shard", "criterion", "energy", "apex"),
+        ("sweep", "contact", "gated", "ungated"),
+        ("sweep", "criterion", "energy", "apex"),
+        ("sweep", "verdict", "passed", "sank"),
+        ("frontier", "criterion", "energy", "apex"),
+        ("frontier", "cell_contact", "gated", "ungated"),
+        ("frontier", "edge", "first_pass", "last_fail"),
+    ],
+)
+def test_words_that_changed_places_are_told(kind, name, first, second, tmp_path):
+    path = tmp_path / f"{kind}.h5"
+    write_dataset(swapped(open_file(NEWEST / f"{kind}.h5"), name, first, second), path)
+    report = verify(path)
+    assert any(problem.reason.startswith(f"{name}: flag_meanings = ") for problem in report.problems), report.lines()
+
+
+def test_words_that_a_later_version_adds_are_read_and_words_that_are_gone_are_not():
+    run = open_file(NEWEST / "run.h5")
+    known = str(run.verdict.attrs["flag_meanings"])
+    run.verdict.attrs["flag_meanings"] = f"{known} exploded"
+    assert sanity.word_problems(run) == []
+    run.verdict.attrs["flag_meanings"] = known.replace("apex_rose ", "")
+    assert sanity.word_problems(run)
+    del run.verdict.attrs["flag_meanings"]
+    assert sanity.word_problems(run) == [f"verdict: flag_meanings = : allowed are {known}, in this order"]
+
+
+def test_a_sweep_has_the_criteria_whose_measures_it_holds():
+    sweep = open_file(NEWEST / "sweep.h5")
+    sweep.criterion.attrs["flag_meanings"] = "energy restitution"
+    assert sanity.word_problems(sweep) == [
+        "criterion: flag_meanings = energy restitution: allowed are energy apex, in this order"
+    ]
+
+
+@pytest.mark.parametrize(("kind", "name"), [("frontier", "criterion"), ("frontier", "edge"), ("run", "axis")])
+def test_a_dimension_counts_its_words(kind, name):
+    dataset = open_file(NEWEST / f"{kind}.h5")
+    turned = dataset.assign_coords({name: (name, dataset[name].values[::-1], dataset[name].attrs)})
+    assert any(line.startswith(f"{name} = ") for line in sanity.word_problems(turned))
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1", "1.2"])
+def test_a_text_of_an_older_file_about_its_verdict_is_not_what_is_shown(version):
+    run = open_file(FORMATS / version / "run.h5")
+    lying = run.assign_attrs(verdict_text="energy grew: by far")
+    for dataset in (run, lying):
+        text = file_page.as_text(dataset, "run.h5")
+        assert "  passed: every criterion that was looked at holds" in text and "energy grew" not in text
+
+
+def test_a_run_of_today_does_not_say_its_verdict_twice():
+    assert "verdict_text" not in open_file(NEWEST / "run.h5").attrs

@@ -11,7 +11,7 @@ from stiffdice.errors import InputError
 from stiffdice.experiments.work_precision.measure import Effort, lag_time, path_of
 from stiffdice.experiments.work_precision.problems import MEASURES, PROBLEMS, SAMPLES, Judge, scene_of, touchdown
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
 BASE = from_mapping(
@@ -25,7 +25,7 @@ BASE = from_mapping(
 
 
 def reference_of(problem, scene):
-    return stepper.ready("scipy_lsoda", scene, problem.model, SAMPLES, SAMPLES, 1e-11)()().states
+    return engines.ready("scipy_lsoda", scene, problem.model, SAMPLES, SAMPLES, 1e-11)()().states
 
 
 @pytest.fixture(scope="module", params=PROBLEMS)

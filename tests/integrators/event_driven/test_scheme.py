@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from stiffdice.dynamics import flat_bounce
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
 STIFFNESSES = (1e2, 1e4, 1e8, 1e12)
@@ -102,7 +102,7 @@ def rough_throw(stiffness):
 def test_the_error_goes_with_the_tolerance_where_friction_holds_a_corner(stiffness):
     """Against LSODA, which is itself right to 1e-9: from its own at a tenth of the tolerance it differs by so much."""
     scene = rough_throw(stiffness)
-    best = stepper.ready("scipy_lsoda", scene, "tumbling", 30, 30, 1e-13)()().states["position"]
+    best = engines.ready("scipy_lsoda", scene, "tumbling", 30, 30, 1e-13)()().states["position"]
     for tolerance in (1e-6, 1e-8, 1e-9, 1e-11, 1e-13):
         own, evaluations = places(scene, tolerance)
         assert apart(own, best) < 3 * tolerance + 1e-9

@@ -9,8 +9,7 @@ import pytest
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.dynamics.state import physics_of, rotated, start_of
 from stiffdice.integrators.event_driven.touchdown import free_time
 from stiffdice.scene.scene import from_mapping
 

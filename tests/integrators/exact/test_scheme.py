@@ -19,7 +19,7 @@ from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
-from stiffdice.integrators.exact import regularised_friction
+from stiffdice.integrators.exact import oscillator
 from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, response
 from stiffdice.scene.cube import Cube
 from stiffdice.scene.flat_landing import CONTACT_LAWS
@@ -397,15 +397,13 @@ def test_friction_slows_as_lamberts_function_says(speed, part):
         z = float(mpmath.log(mpf(speed) / left))
     # What rounding the loss does to it.
     close = 4e-16 * (1 + z + loss / (float(left) + cutoff))
-    assert regularised_friction.slowed(speed, cutoff, loss) == pytest.approx(
-        z, rel=4e-16, abs=close if part > 1e-3 else 0
-    )
+    assert oscillator.slowed(speed, cutoff, loss) == pytest.approx(z, rel=4e-16, abs=close if part > 1e-3 else 0)
 
 
 def test_a_stuck_cube_ends_at_rest():
-    assert regularised_friction.slowed(5.0, 1e-6, 1e9) == pytest.approx(1e15, rel=1e-8)
-    assert regularised_friction.evenly(5.0, 1e-6, 0.7, 1e9)[0] == 0.0
-    assert regularised_friction.evenly(5.0, 1e-6, 0.7, 1e9)[1] == pytest.approx(25 / 1.4, rel=1e-6)
+    assert oscillator.slowed(5.0, 1e-6, 1e9) == pytest.approx(1e15, rel=1e-8)
+    assert oscillator.evenly(5.0, 1e-6, 0.7, 1e9)[0] == 0.0
+    assert oscillator.evenly(5.0, 1e-6, 0.7, 1e9)[1] == pytest.approx(25 / 1.4, rel=1e-6)
 
 
 sizes = st.one_of(st.just(0.0), st.floats(-4, 14).map(lambda exponent: 10**exponent))

@@ -7,7 +7,7 @@ import pytest
 
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import registry, stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
 pytestmark = [pytest.mark.long, pytest.mark.parametrize("name", ["mujoco", "pybullet"])]
@@ -22,7 +22,7 @@ def scene_of(ground, launch=(), duration=1.0):
 
 def engine_of(name):
     pytest.importorskip(f"stiffdice.simulation.engines.{name}")
-    return registry.adapter_of(name)
+    return engines.adapter_of(name)
 
 
 def run(name, scene, model, steps, every=1):
@@ -40,7 +40,9 @@ def test_the_path_of_a_free_flight_lags_as_it_is_said(name, model):
     states = run(name, scene, model, 100)
     place, speed = states["position"][:, 2], states["velocity"][:, 2]
     slope = (place[2:] - place[:-2]) / (2 * h)
-    np.testing.assert_allclose(slope, (speed + stepper.lag(name) * np.diff(speed, prepend=np.nan))[1:-1], atol=1e-10)
+    np.testing.assert_allclose(
+        slope, (speed + engines.adapter_of(name).LAG * np.diff(speed, prepend=np.nan))[1:-1], atol=1e-10
+    )
     turns = model == "flying"
     spin = [0.3, 0.5, 0.2] if turns else [0, 0, 0]
     np.testing.assert_allclose(states["angular_momentum"], np.tile(spin, (100, 1)), atol=1e-13)

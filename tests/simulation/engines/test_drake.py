@@ -11,7 +11,7 @@ import pytest
 from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
 pytest.importorskip("pydrake")
@@ -52,7 +52,7 @@ def bounce(stiffness, damping, omega_h, phase, speed=5.0):
     h = omega_h / math.sqrt(4 * stiffness)
     scene = flat(speed * h * phase, (0.0, 0.0, -speed), stiffness=stiffness, damping=damping)
     last = run(scene, "vertical", h, 1, int(1.5 * math.pi / omega_h) + 30)[0]
-    height, lag = last["position"][2] - HALF, stepper.lag("drake") * h * scene.gravity
+    height, lag = last["position"][2] - HALF, engines.adapter_of("drake").LAG * h * scene.gravity
     assert height > 0
     speed_in = math.sqrt((-speed - lag) ** 2 + 2 * scene.gravity * speed * h * phase)
     return speed_in, math.sqrt((last["velocity"][2] - lag) ** 2 + 2 * scene.gravity * height)

@@ -15,16 +15,19 @@ import pytest
 
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.errors import InputError, NotInstalledError, StiffdiceError
-from stiffdice.scene.scene import from_mapping
-from stiffdice.simulation.engines import driver
+from stiffdice.experiments.engines import flat
+from stiffdice.integrators import registry as schemes
+from stiffdice.scene.scene import Scene, from_mapping
 from stiffdice.simulation.engines import registry as engines
-from stiffdice.simulation.engines.registry import ENGINES, PEERS, adapter_of
+from stiffdice.simulation.engines.registry import ENGINES, METHODS, adapter_of
 from stiffdice.simulation.initial_conditions import phased
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import simulate
 
 octave = pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave")
 TRANSCRIPTIONS = ["numpy", pytest.param("octave", marks=octave)]
+
+SCENE = flat(Scene(), friction=0.0)
 
 TILTED = {
     "launch": {"angular_momentum": [0.3, 0.5, 0.2], "orientation": [0.1, 0.2, 0.3]},
@@ -94,8 +97,8 @@ def test_an_ensemble_is_judged_as_ours_is(monkeypatch):
     ours = simulate(scene, model="sliding", steps=430, members=members, criteria=asked, stop=asked)
     assert len(set(ours.steps_done)) == 5
     assert {*ours.verdict} == {Verdict.PASSED, Verdict.ENERGY_GREW}
-    for chunk in (driver._FIRST, 7):
-        monkeypatch.setattr(driver, "_FIRST", chunk)
+    for chunk in (engines._FIRST, 7):
+        monkeypatch.setattr(engines, "_FIRST", chunk)
         theirs = simulate(
             scene, model="sliding", simulator="numpy", steps=430, members=members, criteria=asked, stop=asked
         )
@@ -137,11 +140,11 @@ def test_a_run_that_fails_is_a_result(engine, model):
     assert engine == "scipy" or run.steps_done == ours.steps_done
 
 
-@pytest.mark.parametrize("chunk", [driver._FIRST, 17])
+@pytest.mark.parametrize("chunk", [engines._FIRST, 17])
 def test_lsoda_tells_the_exact_state_after_each_of_our_steps(chunk, monkeypatch):
     """However often it is begun anew."""
-    monkeypatch.setattr(driver, "_FIRST", chunk)
-    monkeypatch.setattr(driver, "_MOST", chunk)
+    monkeypatch.setattr(engines, "_FIRST", chunk)
+    monkeypatch.setattr(engines, "_MOST", chunk)
     scene = from_mapping({"duration": 3.0}, "as_written")
     theirs = simulate(scene, model="sliding", simulator="scipy", steps=400, tolerance=1e-11, every=1)
     exact = simulate(scene, model="sliding", scheme="exact", steps=400, every=1)
@@ -169,10 +172,12 @@ def test_an_engine_that_is_not_installed_says_what_it_needs(engine, monkeypatch)
         raise ModuleNotFoundError("No module named 'it'", name="it")
 
     adapter_of.cache_clear()
-    monkeypatch.setitem(PEERS, engine, PEERS[engine]._replace(load=failing))
+    monkeypatch.setitem(METHODS, engine, METHODS[engine]._replace(load=failing))
     with pytest.raises(NotInstalledError) as caught:
         simulate(from_mapping({}), simulator=engine)
-    assert str(caught.value).startswith(f"simulator = {engine}: needs {PEERS[engine].needs}, which is not installed; ")
+    assert str(caught.value).startswith(
+        f"simulator = {engine}: needs {METHODS[engine].needs}, which is not installed; "
+    )
     adapter_of.cache_clear()
 
 
@@ -181,10 +186,87 @@ def test_an_engine_that_is_broken_says_how(monkeypatch):
         raise ImportError("libGL.so.1: no such file")
 
     adapter_of.cache_clear()
-    monkeypatch.setitem(PEERS, "drake", PEERS["drake"]._replace(load=failing))
+    monkeypatch.setitem(METHODS, "drake", METHODS["drake"]._replace(load=failing))
     with pytest.raises(NotInstalledError, match=r"simulator = drake: Drake cannot be loaded: libGL"):
         engines.adapter_of("drake")
     adapter_of.cache_clear()
+
+
+def test_a_scheme_makes_the_run_that_simulate_makes_however_it_is_cut():
+    whole = simulate(SCENE, model="sliding", steps=2000, every=100).trajectory
+    run = engines.adapter_of("symplectic_euler")(SCENE, "sliding", start_of(SCENE, "sliding"), SCENE.duration / 2000)
+    states = np.zeros(20, STATE)
+    assert run.advance(states[:7], 100) == 700
+    assert run.advance(states[7:], 100) == 1300
+    np.testing.assert_array_equal(states["position"], whole.state["position"][1:])
+
+
+def test_an_engine_and_a_scheme_are_started_alike():
+    ends = []
+    for method in ("symplectic_euler", "numpy"):
+        run = engines.ready(method, SCENE, "sliding", 500, 5)
+        assert run()().evaluations == 500
+        states = np.zeros(1, STATE)
+        engines.adapter_of(method)(SCENE, "sliding", start_of(SCENE, "sliding"), 0.001).advance(states, 200)
+        ends.append(states["position"])
+    np.testing.assert_allclose(*ends, rtol=1e-12)
+
+
+def test_methods_are_schemes_and_engines():
+    assert engines.chosen_from(["rk4", "numpy"]) == ["rk4", "numpy"]
+    with pytest.raises(InputError, match="methods = bullet"):
+        engines.chosen_from(["bullet"])
+    assert (
+        engines.adapter_of("symplectic_euler").LAG
+        == schemes.LAGS["symplectic_euler"]
+        == engines.adapter_of("numpy").LAG
+    )
+    assert engines.METHODS["scipy"].own_steps
+    assert engines.METHODS["event"].own_steps
+    assert not engines.METHODS["numpy"].own_steps
+    assert (
+        engines.METHODS["numpy"].dearness
+        > engines.METHODS["scipy_lsoda"].dearness
+        > engines.METHODS["rk4"].dearness
+        == 1
+    )
+
+
+def test_versions_are_told_of_engines_alone():
+    assert engines.attributes(["rk4"]) == {}
+    told = engines.attributes(["rk4", "numpy", "scipy"])["engine_versions"]
+    assert told.startswith(f"numpy {np.__version__}; scipy ")
+
+
+def test_what_a_method_cannot_represent_is_told():
+    tilted = Scene().with_ground(normal=(0.6, 0.0, 0.8), contact="gated")
+    assert "ground" in str(engines.adapter_of("exact").unfit(tilted, "sliding"))
+    assert engines.adapter_of("numpy").unfit(tilted, "sliding") is None
+
+
+@pytest.mark.parametrize("model", ["sliding", "tumbling"])
+def test_bare_steps_are_those_of_the_simulator_to_the_last_bit(model):
+    scene = from_mapping({"launch": {"angular_momentum": [0.3, 0.5, 0.2]}, "duration": 2.0}, "as_written")
+    run = engines.ready("symplectic_euler", scene, model, 20_000, 10)
+    kept = simulate(scene, model=model, steps=20_000, every=2000)
+    path = run()()
+    assert path.states.tobytes() == kept.trajectory.state.tobytes()
+    assert path.evaluations == path.computed == int(kept.evaluations[0]) == 20_000
+    np.testing.assert_array_equal(run()().states, path.states)  # the launch is as it was
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("symplectic_euler", "sliding", 25), "steps = 25: allowed is a multiple of samples = 10"),
+        (("leapfrog", "sliding", 20), "method = leapfrog"),
+        (("symplectic_euler", "rolling", 20), "model = rolling"),
+    ],
+)
+def test_what_cannot_be_stepped_is_said(names, told):
+    method, model, steps = names
+    with pytest.raises(InputError, match=told):
+        engines.ready(method, Scene(), model, steps, 10)
 
 
 @octave

@@ -13,8 +13,9 @@ from stiffdice.dynamics.state import start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.work_precision.problems import PROBLEMS, SAMPLES, Judge, scene_of
 from stiffdice.scene.scene import Scene, from_mapping
-from stiffdice.simulation.engines import scipy_ivp, stepper
-from stiffdice.simulation.engines.registry import PEERS, SOLVERS, Peer
+from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.engines import scipy_ivp
+from stiffdice.simulation.engines.registry import SOLVERS, Peer
 from stiffdice.simulation.run import simulate
 
 THROW = {
@@ -25,7 +26,7 @@ THROW = {
 
 
 def solved(peer, scene, model, tolerance):
-    return stepper.ready(peer, scene, model, SAMPLES, SAMPLES, tolerance)()()
+    return engines.ready(peer, scene, model, SAMPLES, SAMPLES, tolerance)()()
 
 
 @pytest.mark.parametrize("peer", SOLVERS)
@@ -96,11 +97,11 @@ def test_what_fails_is_not_a_number_and_says_no_more():
 
 def test_a_peer_that_is_not_there_is_told(monkeypatch):
     with pytest.raises(InputError, match=r"method = euler: allowed is symplectic_euler or"):
-        stepper.ready("euler", Scene(), "sliding", 4, 4)
+        engines.ready("euler", Scene(), "sliding", 4, 4)
     engine = Peer(lambda: importlib.import_module("stiffdice_engine"), "Engine", "the package engine", "make it")
-    monkeypatch.setitem(PEERS, "engine", engine)
+    monkeypatch.setitem(engines.METHODS, "engine", engine)
     with pytest.raises(InputError, match="method = engine: needs the package engine, which is not installed; make it"):
-        stepper.ready("engine", Scene(), "sliding", 4, 4)
+        engines.ready("engine", Scene(), "sliding", 4, 4)
 
 
 def test_scipy_is_imported_by_its_peers_only_and_these_by_whom_they_are_asked_for():

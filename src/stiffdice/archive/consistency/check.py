@@ -1,16 +1,26 @@
 """Whether the numbers of a file can be those of what it says it is: physics and bookkeeping, computed once more.
 
+And whether its words are those of the registries: a number alone does not say that it means `passed`.
+
 Nothing here runs a simulation. Every check follows from an equation that the file's own numbers must fulfil, and every
 bound from counting the roundings between the two sides of it; none is fitted to files.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 
-from stiffdice.archive.consistency import runs, sweeps
+from stiffdice.archive.consistency import equations
 from stiffdice.errors import InputError
+from stiffdice.scene.flat_landing import CONTACT_LAWS
+from stiffdice.simulation import energy_budget
+from stiffdice.simulation.criteria.registry import CRITERIA
+from stiffdice.simulation.dataset import AXES
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.sweep import stability_limits
 
 # What of a file the checks here do not see, by its kind.
 NOT_SEEN = {
@@ -23,17 +33,32 @@ NOT_SEEN = {
 
 # By what a file must hold to be one; the first that fits.
 _KINDS = {
-    "run": ({"time", "position", "kinetic_energy"}, runs.problems),
-    "shard": ({"cell", "member", "verdict", "steps_done"}, sweeps.of_runs),
-    "sweep": ({"cell", "failing", "verdicts"}, sweeps.of_cells),
+    "run": ({"time", "position", "kinetic_energy"}, equations.of_run),
+    "shard": ({"cell", "member", "verdict", "steps_done"}, equations.of_shard),
+    "sweep": ({"cell", "failing", "verdicts"}, equations.of_cells),
     "frontier": ({"edge", "first_pass", "limit"}, lambda dataset: []),  # its sweep says all of it
+    "experiment": (set[str](), lambda dataset: []),
 }
+
+_VERDICTS = tuple(verdict.name.lower() for verdict in Verdict)
+_REGISTRIES: dict[str, Sequence[str]] = {
+    "contact": tuple(CONTACT_LAWS),
+    "cell_contact": tuple(CONTACT_LAWS),
+    "verdict": _VERDICTS,
+    "ending": _VERDICTS,
+    "criterion": tuple(CRITERIA),
+    "axis": AXES,
+    "edge": tuple(stability_limits.EDGES),
+    "bounce_ended": energy_budget.ENDED,
+}
+# Dimensions that count all words of their enum.
+_COUNTED = ("criterion", "verdict", "axis", "edge")
 
 
 def kind_of(dataset: xr.Dataset) -> str:
     """Return `run`, `shard`, `sweep` or `frontier`; `experiment` for any other."""
-    there = set(map(str, [*dataset.variables, *dataset.sizes]))
-    return next((kind for kind, (names, _) in _KINDS.items() if names <= there), "experiment")
+    there = {*dataset.variables, *dataset.sizes}
+    return next(kind for kind, (names, _) in _KINDS.items() if names <= there)
 
 
 def problems(dataset: xr.Dataset) -> list[str]:
@@ -43,8 +68,6 @@ def problems(dataset: xr.Dataset) -> list[str]:
     sweeps: counts and verdicts.
     """
     kind = kind_of(dataset)
-    if kind == "experiment":
-        return []
     try:
         with np.errstate(all="ignore"):  # a run that blew up holds infinities
             return _KINDS[kind][1](dataset)
@@ -52,3 +75,26 @@ def problems(dataset: xr.Dataset) -> list[str]:
         return [str(error)]
     except Exception as error:  # whatever a file that is not ours makes of what looks at it
         return [f"cannot be checked as a {kind}: {type(error).__name__}: {(str(error).splitlines() or [''])[0]}"]
+
+
+def word_problems(dataset: xr.Dataset) -> list[str]:
+    """Return a line for every enum whose words are not its registry's.
+
+    Registries grow at their end: the words of an older file are the first of a registry, those of a later file begin
+    with all of it. A sweep holds the criteria that were asked, in the registry's order, and their worst measures.
+    """
+    found = []
+    for name, registry in _REGISTRIES.items():
+        if name not in dataset:
+            continue
+        variable, known = dataset[name], list(registry)
+        words = str(variable.attrs.get("flag_meanings", "")).split()
+        if name == "criterion" and "verdicts" in dataset:
+            known = [word for word in known if f"largest_{CRITERIA[word].MEASURE}" in dataset]
+        elif name == "criterion" and "decided" not in dataset:  # of a frontier; a shard tells of all
+            known = [word for word in known if word in words]
+        if not words or not known or any(word != right for word, right in zip(words, known, strict=False)):
+            found.append(f"{name}: flag_meanings = {' '.join(words)}: allowed are {' '.join(known)}, in this order")
+        elif name in _COUNTED and variable.dims == (name,) and variable.values.tolist() != list(range(len(words))):
+            found.append(f"{name} = {variable.values.tolist()}: allowed are 0 to {len(words) - 1}, in this order")
+    return found

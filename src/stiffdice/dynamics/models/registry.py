@@ -1,17 +1,15 @@
 """Which motion is computed. A model is a module with TAG, `force`, `kick` and `drift`; one line registers it.
 
-What turns the cube, and what the ground touches, is said in `state.py`.
+What turns the cube, and what the ground touches, is said in `state.py`. The force is that of a cube near the ground.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
-from stiffdice.dynamics.contact import lowest_of
+from stiffdice.dynamics.contact import Wrench, height_of, lowest_of, reaches
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
-from stiffdice.dynamics.state import TOUCHING, TURNING, Motion, Physics
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics
 from stiffdice.dynamics.vector import norm, vector
 
 _MODULES: dict[str, Any] = {
@@ -28,8 +26,6 @@ def _chosen(part: str) -> Callable[..., Any]:
     return by_tag({type(module.TAG): getattr(module, part) for module in _MODULES.values()})
 
 
-# (model, physics, state) -> force [N] and torque [N m] on the body in this state.
-force = _chosen("force")
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
 kick = _chosen("kick")
 # (model, physics, state, h): advance place and orientation by h [s] at the state's velocities.
@@ -37,23 +33,16 @@ drift = _chosen("drift")
 # (model) -> whether the body turns; whether the ground can act on it.
 turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
+# (model, physics, state) -> force [N] and torque [N m] on the body near the ground.
+_near = _chosen("force")
 
 
 @njit
-def turn(model: Any, physics: Physics, state: Any, duration: float) -> None:
-    """Turn the body at its present spin for so long [s], as in a free flight."""
-    if turns(model):
-        tumbling.turn(physics, state, duration)
-
-
-@njit
-def motion(model: Any, physics: Physics, state: Any) -> Motion:
-    """Return the velocity [m/s] and the spin [rad/s] at which place and orientation change."""
-    ux, uy, uz = vector(state.velocity)
-    if not turns(model):
-        return ux, uy, uz, 0.0, 0.0, 0.0
-    lx, ly, lz = vector(state.angular_momentum)
-    return ux, uy, uz, lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
+def force(model: Any, physics: Physics, state: Any) -> Wrench:
+    """Return force [N] and torque [N m] on the body in this state."""
+    if touches(model) and reaches(physics, height_of(physics, state) - physics.reach):
+        return _near(model, physics, state)
+    return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
 
 
 @njit

@@ -1,12 +1,10 @@
 """`sliding`: translation only, the paper's ground_cube.m. The cube keeps the orientation it starts with."""
 
-from __future__ import annotations
-
 from collections import namedtuple
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import Wrench, height_of, node_force, reaches, upward
+from stiffdice.dynamics.contact import Wrench, node_force, upward
 from stiffdice.dynamics.state import Physics
 from stiffdice.dynamics.vector import Vector, plus, row, vector
 
@@ -17,8 +15,6 @@ TAG = Sliding()
 @njit
 def force(physics: Physics, state: Any) -> Wrench:
     """Return the total force on the cube [N]; its torque is left out."""
-    if not reaches(physics, height_of(physics, state) - physics.reach):
-        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     place, velocity, total = vector(state.position), vector(state.velocity), Vector(0.0, 0.0, 0.0)
     for k in range(len(state.node_offset)):
         depth = -upward(physics, plus(place, row(state.node_offset, k)))

@@ -4,14 +4,12 @@ A cube's inertia is the same about every axis, so that the spin is L/I however t
 it (paper, section 2.1).
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import Wrench, height_of, node_force, node_velocity, reaches, upward
+from stiffdice.dynamics.contact import Wrench, node_force, node_velocity, upward
 from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Physics
 from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, vector
@@ -23,8 +21,6 @@ TAG = Tumbling()
 @njit
 def force(physics: Physics, state: Any) -> Wrench:
     """Return the total force [N] and torque about the centre [N m] (equations 3 and 10)."""
-    if not reaches(physics, height_of(physics, state) - physics.reach):
-        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     place, total, torque = vector(state.position), Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     for k in range(len(state.node_offset)):
         arm = row(state.node_offset, k)

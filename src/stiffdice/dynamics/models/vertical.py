@@ -4,13 +4,11 @@ Where `sliding` has no tangential motion it is the same to the last bit: frictio
 nodes are summed in the same order.
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import Wrench, normal_force, reaches
+from stiffdice.dynamics.contact import Wrench, normal_force
 from stiffdice.dynamics.state import Physics
 
 Vertical = namedtuple("Vertical", ())
@@ -21,10 +19,7 @@ TAG = Vertical()
 def force(physics: Physics, state: Any) -> Wrench:
     """Return the normal forces and the weight [N]; friction and torque are left out."""
     z, speed = state.position[2], state.velocity[2]
-    if not reaches(physics, z - physics.reach):
-        return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
-    nodes = state.node_offset
-    fz = 0.0
+    nodes, fz = state.node_offset, 0.0
     for k in range(nodes.shape[0]):
         fz += normal_force(physics, -(z + nodes[k, 2]), speed) - physics.node_weight
     return 0.0, 0.0, fz, 0.0, 0.0, 0.0

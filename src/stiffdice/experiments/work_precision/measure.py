@@ -25,9 +25,8 @@ from stiffdice.experiments.work_precision.problems import MEASURES, PROBLEMS, SA
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.engines import stepper
-from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS
-from stiffdice.simulation.engines.stepper import Path
+from stiffdice.simulation.engines import registry as engines
+from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS, Path
 from stiffdice.simulation.run import simulate
 
 # The scheme whose error does not depend on the step, and that knows flat landings only.
@@ -72,12 +71,12 @@ def chosen_from(problem: Problem, names: Sequence[str]) -> list[str]:
     Raises InputError for any other name, and for an engine that is not installed.
     """
     known = methods_for(problem)
-    return known if list(names) == [ALL] else stepper.chosen_from(names, [*known, *STEPPING])
+    return known if list(names) == [ALL] else engines.chosen_from(names, [*known, *STEPPING])
 
 
 def fixed_step(method: str) -> bool:
     """Return whether a method has a fixed step."""
-    return not stepper.own_steps(method) and method != EXACT
+    return not engines.METHODS[method].own_steps and method != EXACT
 
 
 def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Iterator[Effort]:
@@ -99,7 +98,7 @@ def ladder(scene: Scene, method: str, per_decade: int, most_steps: float) -> Ite
 
 def plain(problem: Problem, scene: Scene, method: str, effort: Effort) -> Callable[[], Callable[[], Path]]:
     """Return a function that starts a run from the launch, and returns another that makes it step by step."""
-    return stepper.ready(method, scene, problem.model, effort.steps or SAMPLES, SAMPLES, effort.tolerance)
+    return engines.ready(method, scene, problem.model, effort.steps or SAMPLES, SAMPLES, effort.tolerance)
 
 
 def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget: int) -> Path:
@@ -118,7 +117,7 @@ def path_of(problem: Problem, scene: Scene, method: str, effort: Effort, budget:
 
 def lag_time(scene: Scene, method: str, effort: Effort) -> float:
     """Return by how long [s] a method's velocity is behind its place."""
-    return stepper.lag(method) * scene.duration / effort.steps if fixed_step(method) else 0.0
+    return engines.adapter_of(method).LAG * scene.duration / effort.steps if fixed_step(method) else 0.0
 
 
 def by_effort(
@@ -203,7 +202,7 @@ def measure(
     variables["floor"] = quantity(("stiffness", "bound", "measure"), floor, _FLOOR)
     told = {"scene_note": _NOTE, "problem": problem, "samples": SAMPLES, "reference": sources[0]}
     title = f"Work and precision: {chosen.name}"
-    return result(variables, title, scene, chosen.model, "method", __name__, **told, **stepper.attributes(names))
+    return result(variables, title, scene, chosen.model, "method", __name__, **told, **engines.attributes(names))
 
 
 def _climbed(
@@ -215,7 +214,7 @@ def _climbed(
     """
     rungs: list[dict[str, float]] = []
     too_dear = 0
-    most = budget / stepper.dearness(method)
+    most = budget / engines.METHODS[method].dearness
     growth = 10 ** (1 / per_decade) if fixed_step(method) else 1.0  # known beforehand
     for effort in ladder(scene, method, per_decade, steps):
         if len(rungs) > 1 and rungs[-1]["evaluations_computed"] * growth > most:
@@ -301,7 +300,7 @@ def time(
     variables = coordinates(stiffness=grounds, method=names)
     variables |= by_effort(found, {"seconds": ("median wall time of a run", "s")})
     variables["seconds_per_step"] = quantity(GRID[:2], per_step, _PER_STEP, "s")
-    told = {"problem": problem, "samples": SAMPLES, "rounds": rounds, **stepper.attributes(names), **machine()}
+    told = {"problem": problem, "samples": SAMPLES, "rounds": rounds, **engines.attributes(names), **machine()}
     title = f"Time of work and precision: {chosen.name}"
     return result(variables, title, scene, chosen.model, "method", __name__, **told)
 

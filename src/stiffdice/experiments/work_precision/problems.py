@@ -12,8 +12,7 @@ import numpy as np
 
 from stiffdice.dynamics import flat_bounce
 from stiffdice.dynamics.energy import energies
-from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import States, physics_of, start_of
+from stiffdice.dynamics.state import States, physics_of, rotated, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected
 from stiffdice.experiments.placement import level, relaunched, upright

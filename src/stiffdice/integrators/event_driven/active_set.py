@@ -9,8 +9,6 @@ The motion is a vector: position [m], velocity [m/s], angular momentum [kg m²/s
 turned the nodes since the vector was made; of a body that does not turn the last two stay as they are.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 
@@ -47,9 +45,10 @@ class Contact(NamedTuple):
 
 
 class Node(NamedTuple):
-    """arm [m]: place relative to the centre; clearance [m]; speed along the normal and slip along the ground [m/s]."""
+    """arm [m]: place relative to the centre; clearance [m]; velocity [m/s]: speed along the normal, slip aside."""
 
     arm: Vector
+    velocity: Vector
     clearance: float
     speed: float
     slip: Vector
@@ -83,21 +82,15 @@ def _turned(motion: Any, sense: float, v: Vector) -> Vector:
 
 
 @njit
-def _arm_and_velocity(contact: Contact, motion: Any, k: int) -> tuple[Vector, Vector]:
-    """Return place relative to the centre [m] and velocity [m/s] of node k."""
+def node_of(contact: Contact, motion: Any, k: int) -> Node:
+    """Return where node k is, and how it moves."""
     arm, velocity = row(contact.regime.nodes, k), part_of(motion, 3)
     if contact.turning:
         arm = _turned(motion, 1.0, arm)
         velocity = plus(velocity, cross(spin_of(contact.physics, motion), arm))
-    return arm, velocity
-
-
-@njit
-def node_of(contact: Contact, motion: Any, k: int) -> Node:
-    """Return where node k is, and how it moves."""
-    arm, velocity = _arm_and_velocity(contact, motion, k)
     height, n = upward(contact.physics, part_of(motion, 0)), normal_of(contact.physics)
-    return Node(arm, height + n.x * arm.x + n.y * arm.y + n.z * arm.z, *split(contact.physics, velocity))
+    clearance = height + n.x * arm.x + n.y * arm.y + n.z * arm.z
+    return Node(arm, velocity, clearance, *split(contact.physics, velocity))
 
 
 @njit
@@ -147,7 +140,16 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
     physics = contact.physics
     height, centre_speed = upward(physics, part_of(motion, 0)), upward(physics, part_of(motion, 3))
     centre_gain = upward(physics, part_of(rate, 3))
-    level, turn, bend = _normals(contact, motion, rate)
+    # Three vectors of which the products with a node, not turned yet, are its level, speed and acceleration along the
+    # normal n, relative to the centre; turned back, n, n × ω and n × α + (n·ω) ω − ω² n: for n·(ω × r) = (n × ω)·r,
+    # and n·(ω × (ω × r)) = (n·ω)(ω·r) − ω² n·r.
+    n, none = normal_of(physics), Vector(0.0, 0.0, 0.0)
+    level, turn, bend = n, none, none
+    if contact.turning:
+        spin = spin_of(physics, motion)
+        bend = plus_times(cross(n, spin_of(physics, rate)), dot(n, spin), spin)
+        bend = _turned(motion, -1.0, plus_times(bend, -dot(spin, spin), n))
+        level, turn = _turned(motion, -1.0, n), _turned(motion, -1.0, cross(n, spin))
     for k in range(NODES):
         node = row(contact.regime.nodes, k)
         clearance = height + level.x * node.x + level.y * node.y + level.z * node.z
@@ -164,22 +166,6 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
             change -= physics.stiffness * speed
         pushed = contact.regime.bits[k] & PUSHED != 0
         value[2 * k + 1], slope[2 * k + 1] = (push, change) if pushed else (-push, -change)
-
-
-@njit
-def _normals(contact: Contact, motion: Any, rate: Any) -> tuple[Vector, Vector, Vector]:
-    """Return three vectors of which the products with a node, not turned yet, are its level, speed and acceleration.
-
-    They are along the normal n and relative to the centre; turned back, n, n × ω and n × α + (n·ω) ω − ω² n: for
-    n·(ω × r) = (n × ω)·r, and n·(ω × (ω × r)) = (n·ω)(ω·r) − ω² n·r.
-    """
-    n, none = normal_of(contact.physics), Vector(0.0, 0.0, 0.0)
-    if not contact.turning:
-        return n, none, none
-    spin = spin_of(contact.physics, motion)
-    bend = plus_times(cross(n, spin_of(contact.physics, rate)), dot(n, spin), spin)
-    bend = plus_times(bend, -dot(spin, spin), n)
-    return _turned(motion, -1.0, n), _turned(motion, -1.0, cross(n, spin)), _turned(motion, -1.0, bend)
 
 
 @njit
@@ -278,8 +264,9 @@ def hardness(contact: Contact, motion: Any, hard: Any) -> None:
     for k in range(NODES):
         if bits[k] == 0:
             continue
-        arm, velocity = _arm_and_velocity(contact, motion, k)
-        level, speed, reach = upward(physics, arm), upward(physics, velocity), dot(arm, arm)
+        node = node_of(contact, motion, k)
+        arm, velocity, speed = node.arm, node.velocity, node.speed
+        level, reach = upward(physics, arm), dot(arm, arm)
         along = pliancy + (reach - level * level) / physics.inertia if contact.turning else pliancy
         across = pliancy + reach / physics.inertia if contact.turning else pliancy
         push = -physics.damping * speed

@@ -6,8 +6,6 @@ spin's axis, is not below c + c' s − A s²/2 after s; to go to that bound's ze
 touch-down and converges as Newton's method does (conservative advancement).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -47,7 +45,16 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[fl
     momentum = vector(state.angular_momentum)
     spin = Vector(momentum.x / physics.inertia, momentum.y / physics.inertia, momentum.z / physics.inertia)
     rate = norm(spin) if models.turns(model) else 0.0
-    parts = _level_parts(physics, state, rate, spin)
+    # The nodes' levels [m] as constant, cosine and sine of the angle turned, and the latters' amplitude.
+    parts = np.zeros((len(state.node_offset), 4))
+    for k in range(len(parts)):
+        node = row(state.node_offset, k)
+        parts[k, 0] = level = upward(physics, node)
+        if rate != 0.0:
+            axis = Vector(spin.x / rate, spin.y / rate, spin.z / rate)
+            parts[k, 0] = dot(axis, node) * upward(physics, axis)
+            parts[k, 1], parts[k, 2] = level - parts[k, 0], upward(physics, cross(axis, node))
+            parts[k, 3] = math.hypot(parts[k, 1], parts[k, 2])
     n, place = normal_of(physics), vector(state.position)
     length = abs(n.x * place.x) + abs(n.y * place.y) + abs(n.z * place.z)
     small = _ULPS * (length + abs(speed) * time + physics.reach)
@@ -70,20 +77,3 @@ def free_time(model: Any, physics: Physics, state: Any, most: float) -> tuple[fl
         if time >= most:
             return most, advances
     return time, advances
-
-
-@njit
-def _level_parts(physics: Physics, state: Any, rate: float, spin: Vector) -> Any:
-    """Return the nodes' levels [m] as constant, cosine and sine of the angle turned, and the latters' amplitude."""
-    parts = np.zeros((len(state.node_offset), 4))
-    for k in range(len(parts)):
-        node = row(state.node_offset, k)
-        level = upward(physics, node)
-        if rate == 0.0:
-            parts[k, 0] = level
-            continue
-        axis = Vector(spin.x / rate, spin.y / rate, spin.z / rate)
-        on_axis = dot(axis, node) * upward(physics, axis)
-        parts[k, 0], parts[k, 1], parts[k, 2] = on_axis, level - on_axis, upward(physics, cross(axis, node))
-        parts[k, 3] = math.hypot(parts[k, 1], parts[k, 2])
-    return parts

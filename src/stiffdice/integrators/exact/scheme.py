@@ -8,8 +8,7 @@ at up to eight levels. Which of them press, and which nodes the `ungated` law dr
 
 Between two such events the cube is a damped oscillator, a body in drag, or in free flight (`oscillator.py`). Each is a
 zero of a function known in closed form, and so are the zeros of its derivative: between these it is monotone, and the
-first event is bracketed, never stepped over. Friction on level ground follows from the normal impulse
-(`regularised_friction.py`).
+first event is bracketed, never stepped over. Friction on level ground follows from the normal impulse.
 
 Swings about the rest that never leave the ground are taken at once: each cycle loses the same share of the amplitude,
 as the forces are then homogeneous in place and speed. What is left of a swing below the round-off of the place is rest.
@@ -18,8 +17,6 @@ A step of any length is exact, to round-off and what the motion makes of that. A
 the last place, which deep in a contact is as much as ω times that in the speed: long steps are more precise.
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple
@@ -27,12 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import drags, height_of, normal_of, split
+from stiffdice.dynamics.contact import drags, height_of, normal_of, split, upward
 from stiffdice.dynamics.state import TURNING, Array, Physics
-from stiffdice.dynamics.vector import vector
-from stiffdice.integrators.exact.levels import BELOW, HEIGHT, SUM, fill
-from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, passing
-from stiffdice.integrators.exact.regularised_friction import along, evenly
+from stiffdice.dynamics.vector import row, vector
+from stiffdice.integrators.exact.oscillator import Oscillator, after, along, evenly, first_zero, passing
 from stiffdice.integrators.free_flight import flight, landing
 from stiffdice.scene.scene import Scene
 
@@ -48,6 +43,13 @@ _STILL = 2.0**-50
 # Cycles of a cube that slides are taken at once if that changes less of the way.
 _UNSEEN = 1e-15
 
+# Nodes whose levels differ by less, in units of the farthest node's distance, are level: rounding differs by as much.
+_LEVEL = 2.0**-48
+
+# Rows of the table of levels, lowest first: height above the lowest [m], how many nodes are on those below, and the sum
+# of their heights [m].
+_HEIGHT, _BELOW, _SUM = range(3)
+
 # What changes at the end of a piece.
 _NONE, _TOUCH, _PRESS, _RELEASE = range(4)
 
@@ -56,7 +58,7 @@ class _Ground(NamedTuple):
     """frequency √(S/m) and decay D/2m of one node [1/s]; drags: whether nodes in the air are damped; pull [m/s²].
 
     by_place, by_speed: S and D over their sum, so that by_place·depth − by_speed·speed has the sign of a node's force.
-    levels: how many levels there are.
+    levels: how many levels there are; table: of them, shape (3, 9).
     """
 
     frequency: float
@@ -68,6 +70,7 @@ class _Ground(NamedTuple):
     friction: float
     cutoff: float
     levels: int
+    table: Array
 
 
 class _Course(NamedTuple):
@@ -122,11 +125,16 @@ def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, m
         return 0.0, 1, 1
     slip = math.hypot(math.hypot(along_ground.x, along_ground.y), along_ground.z) if physics.friction > 0.0 else 0.0
     table = np.empty((3, 9))
-    levels, lowest = fill(physics, state, table)
+    levels, lowest = _fill(physics, state, table)
+    both = physics.stiffness + physics.damping
+    by_place, by_speed = (physics.stiffness / both, physics.damping / both) if both > 0.0 else (1.0, 0.0)
+    frequency, decay = math.sqrt(physics.stiffness) / math.sqrt(physics.mass), physics.damping / physics.mass / 2
+    friction, cutoff = physics.friction, physics.cutoff
+    ground = _Ground(frequency, decay, dragging, pull, by_place, by_speed, friction, cutoff, levels, table)
     before = height + lowest
     # Laid on the ground, to round-off of the place.
     start = 0.0 if u == 0.0 and abs(before) <= _LAID * (abs(height) + physics.reach) else before
-    end, pieces = _advance(_ground_of(physics, dragging, pull, levels), table, start, u, slip, h, most)
+    end, pieces = _advance(ground, start, u, slip, h, most)
     c, u, h = end.c, end.u, h - max(0.0, end.left)
     share, time = (end.slip / slip, end.way / slip) if slip > 0.0 else (1.0, h)
     # Gravity along the ground: none where there is friction.
@@ -143,66 +151,81 @@ def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, m
 
 
 @njit
-def _ground_of(physics: Physics, drags: bool, pull: float, levels: int) -> _Ground:
-    stiffness, damping = physics.stiffness, physics.damping
-    both = stiffness + damping
-    by_place, by_speed = (stiffness / both, damping / both) if both > 0.0 else (1.0, 0.0)
-    frequency, decay = math.sqrt(stiffness) / math.sqrt(physics.mass), damping / physics.mass / 2
-    return _Ground(frequency, decay, drags, pull, by_place, by_speed, physics.friction, physics.cutoff, levels)
+def _fill(physics: Physics, state: Any, table: Array) -> tuple[int, float]:
+    """Fill the table of levels; return how many there are, and the lowest's height above the centre [m]."""
+    heights = table[_HEIGHT]
+    count = len(state.node_offset)
+    for k in range(count):
+        height = upward(physics, row(state.node_offset, k))
+        place = k
+        while place > 0 and heights[place - 1] > height:
+            heights[place] = heights[place - 1]
+            place -= 1
+        heights[place] = height
+    table[_BELOW, 0] = table[_SUM, 0] = 0.0
+    levels, start, lowest = 0, 0, 0.0
+    for k in range(1, count + 1):
+        if k < count and heights[k] - heights[k - 1] <= _LEVEL * physics.reach:
+            continue
+        mean = 0.0
+        for member in range(start, k):
+            mean += (heights[member] - heights[start]) / (k - start)
+        mean += heights[start]
+        if levels == 0:
+            lowest = mean
+        heights[levels] = mean - lowest
+        table[_BELOW, levels + 1] = k
+        table[_SUM, levels + 1] = table[_SUM, levels] + (k - start) * (mean - lowest)
+        levels += 1
+        start = k
+    return levels, lowest
 
 
 @njit
-def _pressing(ground: _Ground, table: Array, c: float, u: float) -> int:
-    """Return how many levels, from the lowest on, press on the ground."""
-    j = 0
-    if u < 0.0:
-        while j < ground.levels and c + table[HEIGHT, j] <= 0.0:
-            j += 1
-    else:
-        while j < ground.levels and ground.by_place * (c + table[HEIGHT, j]) + ground.by_speed * u < 0.0:
-            j += 1
-    return j
-
-
-@njit
-def _advance(
-    ground: _Ground, table: Array, c: float, u: float, slip: float, h: float, most: int
-) -> tuple[_Course, int]:
+def _advance(ground: _Ground, c: float, u: float, slip: float, h: float, most: int) -> tuple[_Course, int]:
     """Go on for h [s], or so many pieces, from a clearance c [m] of the lowest level and a speed u [m/s] upwards.
 
     slip [m/s]: along the ground; zero where there is no friction. Return where that ends, and pieces.
     """
-    now = _Course(c, u, _pressing(ground, table, c, u), slip, 0.0, h, 0.0, _NONE)
+    j = 0
+    while j < ground.levels:
+        gap = c + ground.table[_HEIGHT, j]
+        if not (gap <= 0.0 if u < 0.0 else ground.by_place * gap + ground.by_speed * u < 0.0):
+            break
+        j += 1
+    now = _Course(c, u, j, slip, 0.0, h, 0.0, _NONE)
     pieces = 0
     while now.left > 0.0 and pieces < most:
         pieces += 1
         if now.u == 0.0:
-            now = _wait(ground, table, now)
+            now = _wait(ground, now)
         free = now.j == 0 and now.c >= 0.0 and not ground.drags
         t = landing(ground.pull, now.c, now.u) if free else math.inf
         if t < now.left:
-            now = _land(ground, now, t)
+            speed = -math.sqrt(max(0.0, now.u * now.u + 2 * ground.pull * now.c))
+            left, lost = _later(now, t)
+            now = _Course(0.0, speed, 1, now.slip, now.way + now.slip * t, left, lost, _TOUCH)
         elif now.left > 0.0:
-            now = _move(ground, table, now)
+            now = _move(ground, now)
     return now, pieces
 
 
 @njit
-def _springs(ground: _Ground, table: Array, j: int, c: float) -> float:
-    """Return the acceleration by the springs of the lowest j levels [m/s²]."""
-    return -ground.frequency * ground.frequency * (table[BELOW, j] * c + table[SUM, j])
+def _springs(ground: _Ground, now: _Course) -> float:
+    """Return the acceleration by the springs of the levels that press [m/s²]."""
+    return -ground.frequency * ground.frequency * (ground.table[_BELOW, now.j] * now.c + ground.table[_SUM, now.j])
 
 
 @njit
-def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
+def _wait(ground: _Ground, now: _Course) -> _Course:
     """Take what is known ahead of a cube that stands still for a moment: rest, or swings about it."""
-    omega = math.sqrt(table[BELOW, now.j]) * ground.frequency
-    springs = _springs(ground, table, now.j, now.c)
+    omega = math.sqrt(ground.table[_BELOW, now.j]) * ground.frequency
+    springs = _springs(ground, now)
     push = springs - ground.pull
     if abs(push) <= _STILL * (abs(ground.pull) + omega * omega * abs(now.c)):
         slip, slipped = evenly(now.slip, ground.cutoff, ground.friction * springs, now.left)
         return _Course(now.c, 0.0, now.j, slip, now.way + slipped, 0.0, 0.0, _NONE)
-    cycles, period, decay = _cycles(ground, table, now.j, now.c, push, now.slip, now.left)
+    cycles, period, decay = _cycles(ground, now, push)
     if cycles > 0.0:
         moved = -push / omega / omega * math.expm1(-cycles * decay)
         slip, slipped = evenly(now.slip, ground.cutoff, ground.friction * ground.pull, cycles * period)
@@ -214,25 +237,23 @@ def _wait(ground: _Ground, table: Array, now: _Course) -> _Course:
 
 
 @njit
-def _land(ground: _Ground, now: _Course, t: float) -> _Course:
-    """Fly on to the ground, which the cube meets after t [s]."""
-    u = -math.sqrt(max(0.0, now.u * now.u + 2 * ground.pull * now.c))
-    left, lost = _later(now, t)
-    return _Course(0.0, u, 1, now.slip, now.way + now.slip * t, left, lost, _TOUCH)
-
-
-@njit
-def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
+def _move(ground: _Ground, now: _Course) -> _Course:
     """Go on to the next event."""
-    nodes, push = table[BELOW, now.j], _springs(ground, table, now.j, now.c) - ground.pull
+    table = ground.table
+    nodes, push = table[_BELOW, now.j], _springs(ground, now) - ground.pull
     falls = now.u < 0.0 or (now.u == 0.0 and push < 0.0)
-    beta = ground.decay * (table[BELOW, ground.levels] if ground.drags and falls else nodes)
+    beta = ground.decay * (table[_BELOW, ground.levels] if ground.drags and falls else nodes)
     motion = Oscillator(math.sqrt(nodes) * ground.frequency, beta, push, now.u)
     turn = first_zero(motion.omega, beta, now.u, push - 2 * beta * now.u)
-    if falls:
-        t, event = _sink(table, motion, now.j, ground.levels, now.c, min(turn, now.left))
-    else:
-        t, event = _rise(ground, table, motion, now.j, now.c, min(turn, now.left), now.event == _PRESS)
+    t, event = min(turn, now.left), _NONE
+    if not falls:
+        t, event = _rise(ground, motion, now, t)
+    elif now.j < ground.levels:
+        gap = now.c + table[_HEIGHT, now.j]
+        guess = landing(-(push - 2 * beta * now.u), max(0.0, gap), now.u)
+        touch = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, t, guess)
+        if touch <= t:
+            t, event = touch, _TOUCH
     moved, u = after(motion, t)
     slip, slipped = along(motion, ground.pull, ground.friction, now.slip, ground.cutoff, t)
     c, j = now.c + moved, now.j
@@ -242,7 +263,7 @@ def _move(ground: _Ground, table: Array, now: _Course) -> _Course:
         j += -1 if event == _RELEASE else 1
         # To the last digit, where the place alone decides.
         if t > 0.0 and (event == _TOUCH or ground.decay == 0.0):
-            c = -table[HEIGHT, min(j, now.j)]
+            c = -table[_HEIGHT, min(j, now.j)]
     left, lost = _later(now, t)
     return _Course(c, u, j, slip, now.way + slipped, left, lost, event)
 
@@ -256,20 +277,8 @@ def _later(now: _Course, t: float) -> tuple[float, float]:
 
 
 @njit
-def _sink(table: Array, motion: Any, j: int, levels: int, c: float, end: float) -> tuple[float, int]:
-    """Return when [s] the first event of a falling cube is, at `end` at the latest, and which."""
-    if j < levels:
-        gap = c + table[HEIGHT, j]
-        pace = motion.push - 2 * motion.beta * motion.speed
-        t = passing(motion, 1.0, 0.0, gap, -1.0, 0.0, end, landing(-pace, max(0.0, gap), motion.speed))
-        if t <= end:
-            return t, _TOUCH
-    return end, _NONE
-
-
-@njit
-def _rise(ground: _Ground, table: Array, motion: Any, j: int, c: float, end: float, pressed: bool) -> tuple[float, int]:
-    """Return the same for a rising cube.
+def _rise(ground: _Ground, motion: Any, now: _Course, end: float) -> tuple[float, int]:
+    """Return when [s] the first event of a rising cube is, at `end` at the latest, and which.
 
     A level at a height a presses while x = by_place·(c + a) + by_speed·u is negative. As x' is zero once at most before
     the cube turns, x goes one way until then, and the other way from there. A level that has just pressed does not let
@@ -283,11 +292,11 @@ def _rise(ground: _Ground, table: Array, motion: Any, j: int, c: float, end: flo
     climbs = value > 0.0 or (value == 0.0 and slope > 0.0)
     low, high = 0.0, min(end, first_zero(motion.omega, motion.beta, value, slope))
     for _ in range(2):
-        level = j - 1 if climbs else j
+        level = now.j - 1 if climbs else now.j
         if low < high and 0 <= level < ground.levels:
-            gap = ground.by_place * (c + table[HEIGHT, level])
+            gap = ground.by_place * (now.c + ground.table[_HEIGHT, level])
             t = passing(motion, ground.by_place, ground.by_speed, gap, 1.0 if climbs else -1.0, low, high, math.nan)
-            if t <= high and not (climbs and pressed and t == 0.0):
+            if t <= high and not (climbs and now.event == _PRESS and t == 0.0):
                 return t, _RELEASE if climbs else _PRESS
         climbs = not climbs
         low, high = high, end
@@ -295,37 +304,34 @@ def _rise(ground: _Ground, table: Array, motion: Any, j: int, c: float, end: flo
 
 
 @njit
-def _cycles(
-    ground: _Ground, table: Array, j: int, c: float, push: float, slip: float, left: float
-) -> tuple[float, float, float]:
+def _cycles(ground: _Ground, now: _Course, push: float) -> tuple[float, float, float]:
     """Return how many cycles, how long [s] each, and by which power of e [1] the amplitude shrinks in each.
 
     Of a cube that stands still for a moment and will never again change how many levels press: zero where it may. A
     cycle falls at one damping and rises at another, for half a period each.
 
-    Friction slows a sliding cube on average as its weight does. In the slip's z of `regularised_friction.py` as a
+    Friction slows a sliding cube on average as its weight does. In the slip's z of `oscillator.slowed` as a
     function of the loss, expanded about the average, the swing of size y changes the way by less than 5 μ y
     cutoff/(slip + cutoff), as long as the slip is large against the speed of the swing; its part without the cutoff has
     a closed form.
     """
-    nodes = table[BELOW, j]
-    if not nodes * ground.frequency > 0.0:
-        return 0.0, 0.0, 0.0
+    table, j, slip = ground.table, now.j, now.slip
+    nodes = table[_BELOW, j]
     omega = math.sqrt(nodes) * ground.frequency
     rising = ground.decay * nodes
-    falling = ground.decay * (table[BELOW, ground.levels] if ground.drags else nodes)
-    if not falling < omega:
+    falling = ground.decay * (table[_BELOW, ground.levels] if ground.drags else nodes)
+    if not (nodes * ground.frequency > 0.0 and falling < omega):
         return 0.0, 0.0, 0.0
-    size, rest = abs(push) / omega / omega, c + push / omega / omega
-    highest = ground.by_place * (rest + size + table[HEIGHT, j - 1]) + ground.by_speed * omega * size
+    size, rest = abs(push) / omega / omega, now.c + push / omega / omega
+    highest = ground.by_place * (rest + size + table[_HEIGHT, j - 1]) + ground.by_speed * omega * size
     if not highest <= _STILL * ground.by_place * size or (
-        j < ground.levels and not rest - size + table[HEIGHT, j] > 0.0
+        j < ground.levels and not rest - size + table[_HEIGHT, j] > 0.0
     ):
         return 0.0, 0.0, 0.0
     up = math.sqrt(omega - rising) * math.sqrt(omega + rising)
     down = math.sqrt(omega - falling) * math.sqrt(omega + falling)
     period = math.pi / up + math.pi / down
-    cycles = np.floor(left / period)
+    cycles = np.floor(now.left / period)
     if slip > 0.0:
         slowest = max(0.0, 1000 * ground.friction * omega * size - ground.cutoff)
         stops = (slip - slowest) / (ground.friction * ground.pull)

@@ -18,7 +18,7 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
 from stiffdice.report.methods import engines_note, name_of
 from stiffdice.report.number_format import ground_words, readable, scene_of
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 # How far a restitution may be off at any phase, and what energy may be gained.
 OFF = (0.05, 0.1)
@@ -135,7 +135,7 @@ def speed(timings: Mapping[str, xr.Dataset], title: str) -> Table:
     ours = rates[:, names.index(OURS)] if OURS in names else np.full(len(rates), np.nan)
     rows = []
     for k, name in enumerate(names):
-        row = [name_of(name), "force evaluations" if stepper.own_steps(name) else "steps"]
+        row = [name_of(name), "force evaluations" if engines.METHODS[name].own_steps else "steps"]
         for p in range(len(rates)):
             row += [_count(rates[p, k]), _count(ours[p] / rates[p, k])]
         rows.append([*row, f"{100 * np.nanmax(found.spread.values[:, k]):.2g} %"])

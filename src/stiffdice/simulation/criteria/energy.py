@@ -56,10 +56,10 @@ def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) 
     """Return the measure so far, and whether nothing can change it any more."""
     if sight.flight > 0.0:
         slots[3] = 0.0
-        _count(slots, _flying(sight, system.physics, state))
+        count(slots, _flying(sight, system.physics, state))
     elif slots[3] > 0.0:
-        _count(slots, _mechanical(sight, system, state))
-        _count(slots, _without_springs(system.physics, state))
+        count(slots, _mechanical(sight, system, state))
+        count(slots, _without_springs(system.physics, state))
     return slots[0], sight.held > 0.0
 
 
@@ -67,11 +67,12 @@ def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) 
 def finish(slots: Any, sight: Any, physics: Physics, state: Any) -> None:
     """Count the last state, if it is on the ground, by the part of its energy that no spring swings with."""
     if sight.clearance <= 0.0:
-        _count(slots, _without_springs(physics, state))
+        count(slots, _without_springs(physics, state))
 
 
 @njit
-def _count(slots: Any, now: float) -> None:
+def count(slots: Any, now: float) -> None:
+    """Take note of an energy [J]."""
     ratio = 1.0 + (now - slots[1]) / slots[2]
     slots[0] = max(slots[0], ratio)
 

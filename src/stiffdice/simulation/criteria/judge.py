@@ -7,11 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.rotation import along
-from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States, along
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
-from stiffdice.simulation.backend import Setup
 from stiffdice.simulation.criteria.registry import CRITERIA, holds
 from stiffdice.simulation.outcome import BLOW_UP, Verdict, gravest
 from stiffdice.simulation.task import Members, Task
@@ -58,31 +56,23 @@ def judge(
 def endings_of(task: Task) -> dict[Verdict, Flags]:
     """Return whether each run of a task that is over ended so, shape (member,), by the verdict that says it.
 
-    Those are the verdicts that the last state, the launch, the steps and the budget tell.
+    Those are the verdicts that the last state, the launch, the steps and the budget tell. Steps are too long beyond the
+    linear limit of a contact where a run touched the ground, beyond that of the ungated law's drag anywhere, or with
+    more than half a turn in a step, at the launch or at the end. An engine's limits are its own.
     """
-    setup, members = task.setup, task.members
+    setup, members, fewest = task.setup, task.members, np.zeros(len(task.launches))
+    if setup.ours:
+        contact, drag = linear_stability.fewest_steps(setup.scene, setup.model, setup.scheme)
+        fewest = np.maximum(np.where(members.sight["touched"] > 0, contact, 0.0), drag)
+    if setup.model in TURNING & TOUCHING and setup.scheme not in schemes.OWN_STEPS:
+        for states in (task.launches, members.ensemble):
+            fewest = np.fmax(fewest, linear_stability.half_turn_steps(setup.scene, states["angular_momentum"]))
     return {
-        Verdict.UNRESOLVED: unresolved(setup, members.sight["touched"] > 0, task.launches, members.ensemble),
+        Verdict.UNRESOLVED: np.asarray(setup.steps < fewest),
         Verdict.SANK: sunk(task.system.physics, members),
         Verdict.STALLED: stalled(task.launches, setup.step_size),
         Verdict.UNDECIDED: (members.steps_done < setup.steps) & (members.spent >= task.limits.budget),
     }
-
-
-def unresolved(setup: Setup, touched: Flags, launches: States, ends: States) -> Flags:
-    """Return whether steps were too long for what a run met, shape (member,).
-
-    That is: beyond the linear limit of a contact where it touched the ground, beyond that of the ungated law's drag
-    anywhere, or more than half a turn in a step, at the launch or at the end. An engine's limits are its own.
-    """
-    scene, model, scheme, fewest = setup.scene, setup.model, setup.scheme, np.zeros(len(launches))
-    if setup.ours:
-        contact, drag = linear_stability.fewest_steps(scene, model, scheme)
-        fewest = np.maximum(np.where(touched, contact, 0.0), drag)
-    if model in TURNING & TOUCHING and scheme not in schemes.OWN_STEPS:
-        for states in (launches, ends):
-            fewest = np.fmax(fewest, linear_stability.half_turn_steps(scene, states["angular_momentum"]))
-    return np.asarray(setup.steps < fewest)
 
 
 def sunk(physics: Physics, members: Members) -> Flags:

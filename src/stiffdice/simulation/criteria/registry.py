@@ -88,9 +88,8 @@ def open_of(memory: Any) -> int:
     return undecided if limited > 0 else 1
 
 
-def _none(*arguments: Any) -> int:
-    """Stand for the criteria after the last one, and for a `start` that a criterion has not."""
-    return 0
+# Stands for the criteria after the last one, and for a `start` that a criterion has not.
+_none = njit(lambda *_: 0)
 
 
 def _chained(names: list[str]) -> tuple[Any, Any]:
@@ -100,9 +99,9 @@ def _chained(names: list[str]) -> tuple[Any, Any]:
     costs nothing and leaves the kernel cacheable on disk.
     """
     if not names:
-        return njit(_none), njit(_none)
+        return _none, _none
     name, k = names[0], list(CRITERIA).index(names[0])
-    start_this, observe_this = getattr(CRITERIA[name], "start", njit(_none)), CRITERIA[name].observe
+    start_this, observe_this = getattr(CRITERIA[name], "start", _none), CRITERIA[name].observe
     start_others, observe_others = _chained(names[1:])
 
     @njit

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import ClassVar
 
 import numpy as np
 
-from stiffdice.dynamics.rotation import matrices, turned
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, start_of
+from stiffdice.dynamics.models.registry import MODELS
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, along, matrices, physics_of, start_of
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene
 
 
 @dataclass(eq=False)
-class Engine:
+class Engine(ABC):
     """One run of an engine, standing at its launch or where `advance` left it.
 
     launch: STATE records, shape (1,). h [s]: a time step. tolerance [1]: of the error, for an engine that controls its
@@ -33,6 +34,7 @@ class Engine:
     tolerance: float = schemes.TOLERANCE
     most: int | None = schemes.BUDGET
 
+    @abstractmethod
     def __post_init__(self) -> None:
         """Set up the engine, at the launch."""
 
@@ -46,25 +48,53 @@ class Engine:
         """Return the engine's name and version."""
         return f"{cls.PACKAGE} {version(cls.PACKAGE)}"
 
+    @abstractmethod
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations.
 
         Where the run blows up, infinities and not-a-numbers from there on; never an exception.
         """
-        raise NotImplementedError
+
+
+class Scheme(Engine):
+    """One run of a scheme of ours, the one of SCHEME."""
+
+    @classmethod
+    def of(cls, name: str) -> type[Engine]:
+        """Return the class of runs by a scheme."""
+        return type(name, (cls,), {"SCHEME": name, "LAG": schemes.LAGS[name]})
+
+    def __post_init__(self) -> None:
+        self._tags = schemes.SCHEMES[self.SCHEME], MODELS[self.model]
+        self._physics, self._state = physics_of(self.scene), self.launch.copy()
+
+    @classmethod
+    def unfit(cls, scene: Scene, model: str) -> str | None:
+        """Return in one sentence why the scheme does not apply to a scene and model, or None if it does."""
+        return schemes.unfit(cls.SCHEME, scene, model)
+
+    def advance(self, states: States, every: int) -> int:
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
+        whole = np.concatenate([self._state, states])
+        evaluations = schemes.advance(*self._tags, self._physics, whole, every, self.h, self.tolerance)
+        states[:], self._state = whole[1:], whole[-1:]
+        return int(evaluations)
 
 
 class RigidBody(Engine):
-    """A run of an engine of rigid bodies: its ground acts on nothing above it, and the nodes move with the cube."""
+    """A run of an engine of rigid bodies: its ground acts on nothing above it, and the nodes move with the cube.
+
+    A row of its numbers is the place [m] and the velocity [m/s] along `axes`. Of a cube that turns, a unit quaternion
+    (w, x, y, z) follows the place, and the spin [rad/s] the velocity.
+    """
 
     NAME: ClassVar[str]  # for people
 
     def __post_init__(self) -> None:
-        """Take apart what every such engine is set up from."""
         (self.start,) = self.launch.copy()
         self.turns, self.inertia = self.model in TURNING, self.scene.cube.moment_of_inertia
-        # Along which the centre moves.
-        self.axes = [2] if self.model == "vertical" else [0, 1, 2]
+        self.spin = np.asarray(self.start["angular_momentum"] / self.inertia)  # [rad/s]
+        self.axes = slice(2, 3) if self.model == "vertical" else slice(0, 3)  # along which the centre moves
 
     @classmethod
     def unfit(cls, scene: Scene, model: str) -> str | None:
@@ -80,32 +110,35 @@ class RigidBody(Engine):
                 f"ground.contact = ungated, ground.damping = {ground.damping:g}: allowed is contact gated, or damping "
                 f"0, as {cls.NAME}'s ground acts on nothing above it"
             )
-        if model in TURNING and launch.node_velocity == "translation" and any(launch.spin) and _touches(scene, model):
-            return (
-                "launch.node_velocity = translation: allowed is rigid where a spinning cube is launched in the ground, "
-                f"as {cls.NAME}'s nodes move with the cube"
-            )
+        if model in TURNING and launch.node_velocity == "translation" and any(launch.spin):
+            (state,) = start_of(scene, model)
+            if along(state["position"] + state["node_offset"], ground.normal).min() < 0:
+                return (
+                    "launch.node_velocity = translation: allowed is rigid where a spinning cube is launched in the "
+                    f"ground, as {cls.NAME}'s nodes move with the cube"
+                )
         return None
 
-    @property
-    def spin(self) -> Array:
-        """The angular velocity at the launch [rad/s]."""
-        return np.asarray(self.start["angular_momentum"] / self.inertia)
-
-    def put(self, states: States, places: Array, velocities: Array, *turning: Array) -> None:
-        """Make states, shape (K,), of an engine's numbers.
-
-        places [m], velocities [m/s]: along `axes`, shape (K, axis). turning: unit quaternions (w, x, y, z), shape
-        (K, 4), and spins [rad/s], shape (K, 3), of a cube that turns.
-        """
+    def advance(self, states: States, every: int) -> int:
+        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
+        width = len(range(3)[self.axes])
+        rows = np.full((len(states), 13 if self.turns else 2 * width), np.nan)
+        evaluations = sum(self._next(row, every) for row in rows)
+        rows[~np.isfinite(rows).all(axis=1)] = np.nan
         states[:] = self.start
-        states["position"][:, self.axes], states["velocity"][:, self.axes] = places, velocities
         if self.turns:
-            quaternions, spins = turning
-            states["angular_velocity"], states["angular_momentum"] = spins, self.inertia * spins
-            states["node_offset"] = turned(matrices(quaternions), self.start["node_offset"])
+            places, quaternions, velocities, spins = np.split(rows, [3, 7, 10], axis=1)
+            self._turn(states, quaternions, spins)
+        else:
+            places, velocities = np.split(rows, 2, axis=1)
+        states["position"][:, self.axes], states["velocity"][:, self.axes] = places, velocities
+        return evaluations
 
+    @abstractmethod
+    def _next(self, row: Array, every: int) -> int:
+        """Take so many steps, fill a row unless the run blew up, and return the force evaluations."""
 
-def _touches(scene: Scene, model: str) -> bool:
-    (state,) = start_of(scene, model)
-    return bool(((state["position"] + state["node_offset"]) @ np.array(scene.ground.normal)).min() < 0)
+    def _turn(self, states: States, quaternions: Array, spins: Array) -> None:
+        """Make what turns of states."""
+        states["angular_velocity"], states["angular_momentum"] = spins, self.inertia * spins
+        states["node_offset"] = self.start["node_offset"] @ np.swapaxes(matrices(quaternions), 1, 2)

@@ -36,7 +36,7 @@ from pydrake.multibody.tree import PrismaticJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from stiffdice.dynamics.state import TOUCHING, States
+from stiffdice.dynamics.state import TOUCHING, Array, States
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.adapter import RigidBody
 
@@ -62,9 +62,10 @@ class Drake(RigidBody):
         return super().unfit(scene, model)
 
     def __post_init__(self) -> None:
-        """Build Drake's model of the scene and set it to the launch."""
         super().__post_init__()
         self._steps, self._failed = 0, False
+        # Where a row's numbers are among Drake's.
+        self._order = [4, 5, 6, 0, 1, 2, 3, 10, 11, 12, 7, 8, 9] if self.turns else slice(None)
         with _silence():
             builder = DiagramBuilder()
             self._plant, _ = AddMultibodyPlantSceneGraph(builder, self.h)
@@ -75,91 +76,62 @@ class Drake(RigidBody):
             turn, spin = ([1.0, 0.0, 0.0, 0.0], self.spin) if self.turns else ([], [])
             self._plant.SetPositionsAndVelocities(self._context, np.concatenate([turn, place, spin, velocity]))
 
-    def advance(self, states: States, every: int) -> int:
-        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations.
+    def _next(self, row: Array, every: int) -> int:
+        # An evaluation a step: each looks for contacts once. What failed once has failed for good.
+        self._steps += every
+        try:  # up to half a step past the last one: round-off in the time can neither lose a step nor gain one
+            with _silence():
+                if not self._failed:
+                    self._simulator.AdvanceTo((self._steps - 0.5) * self.h)
+        except (RuntimeError, SystemExit):  # the latter is what a failed assertion of Drake's raises
+            self._failed = True
+        if self._failed:
+            return 0
+        row[:] = self._plant.GetPositionsAndVelocities(self._context)[self._order]
+        return every
 
-        That is the steps up to the last state: each looks for contacts once. Where Drake gives up, not-a-number.
-        """
-        rows = np.full((len(states), self._plant.num_multibody_states()), np.nan)
-        evaluations = 0
-        with _silence():
-            for row in rows:
-                if self._step(every):
-                    row[:] = self._plant.GetPositionsAndVelocities(self._context)
-                    evaluations += every
-        if self.turns:
-            turns = rows[:, :4]
-            with np.errstate(all="ignore"):  # a run that blew up
-                turns = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-                self.put(states, rows[:, 4:7], rows[:, 10:], turns, rows[:, 7:10])
-        else:
-            places, velocities = np.split(rows, 2, axis=1)
-            self.put(states, places, velocities)
-        return evaluations
-
-    def _step(self, count: int) -> bool:
-        """Take so many steps, and return whether Drake could; what failed once has failed for good."""
-        self._steps += count
-        if not self._failed:
-            try:  # up to half a step past the last one: round-off in the time can neither lose a step nor gain one
-                self._simulator.AdvanceTo((self._steps - 0.5) * self.h)
-            except (RuntimeError, SystemExit):  # the latter is what a failed assertion of Drake's raises
-                self._failed = True
-        return not self._failed
+    def _turn(self, states: States, quaternions: Array, spins: Array) -> None:
+        with np.errstate(all="ignore"):  # a run that blew up
+            super()._turn(states, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True), spins)
 
 
 @contextmanager
 def _silence() -> Iterator[None]:
     """Let Drake log nothing: it warns of what half spaces cannot do, and of failures that are results here."""
     logger = logging.getLogger("drake")
-    logger.addFilter(_nothing)
+    logger.disabled = True
     try:
         yield
     finally:
-        logger.removeFilter(_nothing)
-
-
-def _nothing(record: logging.LogRecord) -> bool:
-    return False
+        logger.disabled = False
 
 
 def _build(plant: Any, run: Drake) -> None:
-    scene, axes = run.scene, [] if run.turns else run.axes
+    """Give a plant the cube, its nodes and the ground."""
+    scene, cube, ground = run.scene, run.scene.cube, run.scene.ground
     plant.set_contact_model(ContactModel.kPoint)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.set_sap_near_rigid_threshold(0.0)
     plant.SetUseSampledOutputPorts(False)  # nothing reads them, and they take time
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -scene.gravity])
-    gyration = scene.cube.moment_of_inertia / scene.cube.mass
-    inertia = SpatialInertia(scene.cube.mass, np.zeros(3), UnitInertia(gyration, gyration, gyration))
-    cube = plant.AddRigidBody("cube", inertia)
-    _hang(plant, cube, axes)
+    gyration = cube.moment_of_inertia / cube.mass
+    inertia = SpatialInertia(cube.mass, np.zeros(3), UnitInertia(gyration, gyration, gyration))
+    body = plant.AddRigidBody("cube", inertia)
+    # A cube that does not turn is joined to the world by massless carriages, one on another, that slide along axes.
+    below, place = plant.world_body(), np.zeros(3) if run.turns else run.start["position"].copy()
+    for axis in () if run.turns else range(3)[run.axes]:
+        above = body if axis == 2 else plant.AddRigidBody(f"carriage {axis}", SpatialInertia.Zero())
+        plant.AddJoint(PrismaticJoint(f"slide {axis}", below.body_frame(), above.body_frame(), np.eye(3)[axis]))
+        below, place[axis] = above, 0.0
     if run.model in TOUCHING:
-        _lay(plant, scene, cube, run.start, axes)
+        size, normal = _SPHERE * cube.radius, np.array(ground.normal)
+        rigid = _material(_RIGID * ground.stiffness, 0.0, ground.friction)
+        for k, node in enumerate(run.start["node_offset"]):
+            plant.RegisterCollisionGeometry(body, RigidTransform(place + node), Sphere(size), f"node {k}", rigid)
+        soft = _material(ground.stiffness, ground.damping / ground.stiffness, ground.friction)
+        plane = HalfSpace.MakePose(normal, -size * normal)
+        plant.RegisterCollisionGeometry(plant.world_body(), plane, HalfSpace(), "ground", soft)
     plant.Finalize()
-
-
-def _hang(plant: Any, cube: Any, axes: list[int]) -> None:
-    """Join the cube to the world by massless carriages, one on another, that slide along these axes."""
-    below = plant.world_body()
-    for axis in axes:
-        above = cube if axis == axes[-1] else plant.AddRigidBody(f"carriage {axis}", SpatialInertia.Zero())
-        way = np.eye(3)[axis]
-        plant.AddJoint(PrismaticJoint(f"slide {axis}", below.body_frame(), above.body_frame(), way))
-        below = above
-
-
-def _lay(plant: Any, scene: Scene, cube: Any, launch: Any, axes: list[int]) -> None:
-    """Give the cube its nodes and the world its ground."""
-    ground, size = scene.ground, _SPHERE * scene.cube.radius
-    rigid = _material(_RIGID * ground.stiffness, 0.0, ground.friction)
-    place = np.zeros(3) if not axes else np.where(np.isin(range(3), axes), 0.0, launch["position"])
-    for k, node in enumerate(launch["node_offset"]):
-        plant.RegisterCollisionGeometry(cube, RigidTransform(place + node), Sphere(size), f"node {k}", rigid)
-    normal = np.array(ground.normal)
-    plane = HalfSpace.MakePose(normal, -size * normal)
-    soft = _material(ground.stiffness, ground.damping / ground.stiffness, ground.friction)
-    plant.RegisterCollisionGeometry(plant.world_body(), plane, HalfSpace(), "ground", soft)
 
 
 def _material(stiffness: float, relaxation_time: float, friction: float) -> Any:

@@ -27,9 +27,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from stiffdice.dynamics.rotation import matrices
-from stiffdice.dynamics.state import TOUCHING, Array, States
-from stiffdice.scene.scene import Scene
+from stiffdice.dynamics.state import TOUCHING, Array, States, matrices
 from stiffdice.simulation.engines.adapter import RigidBody
 
 _IMPEDANCE = 1e-4  # mjMINIMP
@@ -61,74 +59,40 @@ class Mujoco(RigidBody):
     PACKAGE = "mujoco"
 
     def __post_init__(self) -> None:
-        """Put the cube where it is launched; its own axes are the world's then, the nodes being as launched."""
         super().__post_init__()
         self._model = _compiled(self)
         self._data, self._unseen = mujoco.MjData(self._model), _BATCH
-        count = len(self.axes)
-        self._data.qpos[:count], self._data.qvel[:count] = (
-            self.start["position"][self.axes],
-            self.start["velocity"][self.axes],
-        )
-        if self.turns:
+        places = len(range(3)[self.axes])
+        self._data.qpos[:places] = self.start["position"][self.axes]
+        self._data.qvel[:places] = self.start["velocity"][self.axes]
+        if self.turns:  # its own axes are the world's at the launch, the nodes being as launched
             self._data.qvel[3:] = self.spin
 
-    def advance(self, states: States, every: int) -> int:
-        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
-        count, place, velocity = len(states), self._data.qpos, self._data.qvel
-        places, velocities = np.full((count, self._model.nq), np.nan), np.full((count, self._model.nv), np.nan)
-        for k in range(count):
-            if not self._step(every):
-                break
-            places[k], velocities[k] = place, velocity
-        lost = ~(np.isfinite(places).all(axis=1) & np.isfinite(velocities).all(axis=1))
-        places[lost], velocities[lost] = np.nan, np.nan
-        spins = velocities[:, 3:]
-        if self.turns:  # MuJoCo's are about the cube's own axes
-            spins = (matrices(places[:, 3:]) @ spins[..., None])[..., 0]
-        axes = len(self.axes)
-        self.put(states, places[:, :axes], velocities[:, :axes], places[:, 3:], spins)
-        return count * every
-
-    def _step(self, steps: int) -> bool:
-        """Take so many steps, unless the run is seen to have blown up; return whether they were taken."""
-        for done in range(0, steps, _BATCH):
-            if self._unseen >= _BATCH and not self._goes_on():
-                return False
-            part = min(_BATCH, steps - done)
-            mujoco.mj_step(self._model, self._data, part)
-            self._unseen += part
-        return True
-
-    def _goes_on(self) -> bool:
-        """Return whether the run has not blown up, and see to it that no warning is printed until asked again."""
+    def _next(self, row: Array, every: int) -> int:
         data = self._data
-        # MuJoCo prints a warning, and writes it to a file, when it is the first of its kind.
-        data.warning.number[:] = 1
-        if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
-            return False
-        self._unseen = 0
-        return True
+        for done in range(0, every, _BATCH):
+            if self._unseen >= _BATCH:
+                # MuJoCo prints a warning, and writes it to a file, when it is the first of its kind.
+                data.warning.number[:] = 1
+                if not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()):
+                    return every
+                self._unseen = 0
+            part = min(_BATCH, every - done)
+            mujoco.mj_step(self._model, data, part)
+            self._unseen += part
+        row[: len(data.qpos)], row[len(data.qpos) :] = data.qpos, data.qvel
+        return every
+
+    def _turn(self, states: States, quaternions: Array, spins: Array) -> None:
+        # MuJoCo's spins are about the cube's own axes.
+        super()._turn(states, quaternions, (matrices(quaternions) @ spins[..., None])[..., 0])
 
 
 def _compiled(run: Mujoco) -> mujoco.MjModel:
     """Return the scene of a run as MuJoCo takes it."""
     spec, scene = mujoco.MjSpec(), run.scene
-    _set(spec.option, scene, run.h)
-    _add_cube(spec, scene, run.start["node_offset"], None if run.turns else run.axes)
-    if run.model in TOUCHING:
-        _add_ground(spec, scene, run.model)
-    compiled = spec.compile()
-    stiff = _SOFT * (1 - _IMPEDANCE) / scene.cube.mass
-    compiled.body_invweight0[1, :] = _SOFT / scene.cube.mass
-    compiled.pair_solref[:] = -stiff * scene.ground.stiffness, -stiff * scene.ground.damping
-    # The first number is of no effect, but both at zero stand for the normal direction's. MuJoCo divides by d.
-    compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / run.h
-    return compiled
-
-
-def _set(option: mujoco.MjOption, scene: Scene, h: float) -> None:
-    option.timestep = h
+    option = spec.option
+    option.timestep = run.h
     option.gravity = [0.0, 0.0, -scene.gravity]
     option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -137,36 +101,36 @@ def _set(option: mujoco.MjOption, scene: Scene, h: float) -> None:
     option.tolerance, option.iterations = _TOLERANCE, _ITERATIONS
     option.impratio = _SOFT * (1 - _IMPEDANCE) / _IMPEDANCE / _HARD
     option.disableflags = sum(int(mujoco.mjtDisableBit.__members__[f"mjDSBL_{name}"]) for name in _OFF)
-
-
-def _add_cube(spec: mujoco.MjSpec, scene: Scene, nodes: Array, axes: list[int] | None) -> None:
-    """Add the cube, which slides along these axes; None lets it turn, too."""
-    cube = scene.cube
+    cube, ground, away = scene.cube, scene.ground, {"contype": 0, "conaffinity": 0}
     body = spec.worldbody.add_body(name="cube")
-    if axes is None:
+    if run.turns:
         body.add_freejoint()
     else:
-        for axis in axes:
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=np.eye(3)[axis])
+        for axis in np.eye(3)[run.axes]:
+            body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     body.explicitinertial = True
     body.mass, body.ipos, body.inertia = cube.mass, np.zeros(3), np.full(3, cube.moment_of_inertia)
-    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    for k, node in enumerate(nodes):
-        size = [_SPHERE * cube.radius, 0.0, 0.0]
-        body.add_geom(name=f"node_{k}", type=sphere, size=size, pos=node, contype=0, conaffinity=0)
-
-
-def _add_ground(spec: mujoco.MjSpec, scene: Scene, model: str) -> None:
-    turn = np.empty(4)
-    mujoco.mju_quatZ2Vec(turn, np.array(scene.ground.normal))
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(name="ground", type=plane, size=[0.0, 0.0, 1.0], quat=turn, contype=0, conaffinity=0)
-    friction = scene.ground.friction if model != "vertical" else 0.0
-    for geom in [geom.name for geom in spec.geoms if geom.name != "ground"]:
-        spec.add_pair(
-            geomname1="ground",
-            geomname2=geom,
-            condim=3 if friction > 0 else 1,
-            friction=[friction, friction, 0.0, 0.0, 0.0],
-            solimp=[_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 2.0],
-        )
+    sphere, plane = mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_PLANE
+    nodes = {f"node_{k}": node for k, node in enumerate(run.start["node_offset"])}
+    for name, node in nodes.items():
+        body.add_geom(name=name, type=sphere, size=[_SPHERE * cube.radius, 0.0, 0.0], pos=node, **away)
+    if run.model in TOUCHING:
+        turn = np.empty(4)
+        mujoco.mju_quatZ2Vec(turn, np.array(ground.normal))
+        spec.worldbody.add_geom(name="ground", type=plane, size=[0.0, 0.0, 1.0], quat=turn, **away)
+        friction = ground.friction if run.model != "vertical" else 0.0
+        for name in nodes:
+            spec.add_pair(
+                geomname1="ground",
+                geomname2=name,
+                condim=3 if friction > 0 else 1,
+                friction=[friction, friction, 0.0, 0.0, 0.0],
+                solimp=[_IMPEDANCE, _IMPEDANCE, 1.0, 0.5, 2.0],
+            )
+    compiled = spec.compile()
+    stiff = _SOFT * (1 - _IMPEDANCE) / cube.mass
+    compiled.body_invweight0[1, :] = _SOFT / cube.mass
+    compiled.pair_solref[:] = -stiff * ground.stiffness, -stiff * ground.damping
+    # The first number is of no effect, but both at zero stand for the normal direction's. MuJoCo divides by d.
+    compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / run.h
+    return compiled

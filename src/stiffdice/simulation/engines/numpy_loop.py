@@ -20,7 +20,6 @@ class NumpyLoop(Engine):
     PACKAGE = "numpy"
 
     def __post_init__(self) -> None:
-        """Take the scene's numbers, and the state of the launch."""
         self._physics, self._gated = physics_of(self.scene), self.scene.ground.contact == "gated"
         self._normal = np.array(self.scene.ground.normal)
         self._weight = np.array([0.0, 0.0, -self._physics.node_weight])

@@ -34,7 +34,6 @@ class Octave(Engine):
     BATCH = 4000  # steps of one request: about a second of work, so that an orphan does not outlive it
 
     def __post_init__(self) -> None:
-        """Take the scene's numbers, and the state of the launch."""
         p, model = physics_of(self.scene), self.model
         flags = model in TURNING, model in TOUCHING, model != "vertical", self.scene.ground.contact == "gated"
         rest = p.mass, p.inertia, p.node_weight, p.stiffness, p.damping, p.friction, p.cutoff, p.nx, p.ny, p.nz
@@ -70,7 +69,7 @@ class Process:
 
     def __init__(self) -> None:
         self._complaints: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as the process)
-        self._octave: subprocess.Popen[bytes] = subprocess.Popen(
+        self._octave: Any = subprocess.Popen(
             [str(PROGRAM), "--quiet", "--norc", "--no-history", str(SCRIPT)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -80,8 +79,6 @@ class Process:
 
     def answer(self, request: Array, size: int) -> Any:
         """Return so many bytes of an answer; raises StiffdiceError with Octave's own words if it gives none."""
-        assert self._octave.stdin is not None
-        assert self._octave.stdout is not None
         try:
             self._octave.stdin.write(request.tobytes())
             self._octave.stdin.flush()

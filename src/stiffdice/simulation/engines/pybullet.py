@@ -34,8 +34,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import TOUCHING, States, physics_of
-from stiffdice.scene.scene import Scene
+from stiffdice.dynamics.state import TOUCHING, Array, physics_of
 from stiffdice.simulation.engines.adapter import RigidBody
 
 
@@ -77,70 +76,35 @@ class Pybullet(RigidBody):
     SCHEME = "sequential_impulse"
 
     def __post_init__(self) -> None:
-        """Set up Bullet's model of the scene, at the launch."""
         super().__post_init__()
-        self._batch, self._client = 0, pybullet.connect(pybullet.DIRECT)
-        weakref.finalize(self, pybullet.disconnect, self._client)
-        pybullet.setGravity(0, 0, -self.scene.gravity, physicsClientId=self._client)
-        self._set(_top_speed(self.scene, self.start))
-        self._cube = self._add_cube()
-        if self.model in TOUCHING:
-            self._add_ground()
-
-    def advance(self, states: States, every: int) -> int:
-        """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations."""
-        rows = np.empty((len(states), 13))
-        for row in rows:
-            self._step(every)
-            place, turn = pybullet.getBasePositionAndOrientation(self._cube, self._client)
-            velocity, spin = pybullet.getBaseVelocity(self._cube, self._client)
-            row[:] = *place, turn[3], *turn[:3], *velocity, *spin
-        rows[~np.isfinite(rows).all(axis=1)] = np.nan
-        places, turns, velocities, spins = np.split(rows, [3, 7, 10], axis=1)
-        self.put(states, places[:, self.axes], velocities[:, self.axes], turns, spins)
-        return len(states) * every
-
-    def _step(self, steps: int) -> None:
-        while steps:
-            batch = min(_BATCH, 1 << steps.bit_length() - 1)
-            if batch != self._batch:
-                pybullet.setPhysicsEngineParameter(
-                    fixedTimeStep=self.h * batch, numSubSteps=batch, physicsClientId=self._client
-                )
-                self._batch = batch
-            pybullet.stepSimulation(self._client)
-            steps -= batch
-
-    def _set(self, speed: float) -> None:
-        scene = self.scene
-        stride = linear_theory.contact_frequency(scene.ground.stiffness, scene.cube.mass) * self.h
-        damped = linear_theory.BOUNCE_NODES * scene.ground.damping * self.h / scene.cube.mass
+        scene, cube, ground, launch = self.scene, self.scene.cube, self.scene.ground, self.start
+        here = self._here = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
+        weakref.finalize(self, pybullet.disconnect, **here)
+        pybullet.setGravity(0, 0, -scene.gravity, **here)
+        self._batch = 0
+        nodes, size, p = launch["node_offset"].tolist(), _SPHERE * cube.radius, physics_of(scene)
+        # A speed [m/s] that no node exceeds, unless the run gains energy.
+        turning = math.hypot(*launch["angular_momentum"]) / math.sqrt(p.mass * p.inertia)
+        speed = math.hypot(math.hypot(*launch["velocity"]) + p.gravity * scene.duration, turning)
+        speed *= 1 + p.reach * math.sqrt(p.mass / p.inertia)
+        stride = linear_theory.contact_frequency(ground.stiffness, cube.mass) * self.h
+        damped = linear_theory.BOUNCE_NODES * ground.damping * self.h / cube.mass
         # It counts an impulse S·depth·h as a velocity depth/h of the soft contact, speed/(ωh) at most.
         residual = _RESIDUAL * speed * (1 + 1 / stride if stride > 0 else 1)
         pybullet.setPhysicsEngineParameter(
             numSolverIterations=int(min(_FEWEST + 10 * (stride * stride + damped), _MOST)),
             solverResidualThreshold=residual * residual,
-            contactBreakingThreshold=speed * self.h + 4 * _SPHERE * scene.cube.radius,
+            contactBreakingThreshold=speed * self.h + 4 * size,
             contactSlop=0,
             restitutionVelocityThreshold=0,
             enableConeFriction=1,
-            physicsClientId=self._client,
+            **here,
         )
-
-    def _add_cube(self) -> int:
-        cube, ground, launch = self.scene.cube, self.scene.ground, self.start
-        nodes = launch["node_offset"]
-        shape = pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_SPHERE] * len(nodes),
-            radii=[_SPHERE * cube.radius] * len(nodes),
-            collisionFramePositions=nodes.tolist(),
-            physicsClientId=self._client,
-        )
-        body: int = pybullet.createMultiBody(
-            cube.mass, shape, basePosition=launch["position"].tolist(), physicsClientId=self._client
-        )
+        spheres = [pybullet.GEOM_SPHERE] * len(nodes)
+        shape = pybullet.createCollisionShapeArray(spheres, [size] * len(nodes), collisionFramePositions=nodes, **here)
+        self._cube = pybullet.createMultiBody(cube.mass, shape, basePosition=launch["position"].tolist(), **here)
         pybullet.changeDynamics(
-            body,
+            self._cube,
             -1,
             contactStiffness=ground.stiffness,
             contactDamping=ground.damping,
@@ -148,36 +112,32 @@ class Pybullet(RigidBody):
             localInertiaDiagonal=[self.inertia if self.turns else 0] * 3,
             maxJointVelocity=_ENDLESS,
             **_PLAIN,
-            physicsClientId=self._client,
+            **here,
         )
         spin = self.spin if self.turns else np.zeros(3)
-        pybullet.resetBaseVelocity(body, launch["velocity"].tolist(), spin.tolist(), self._client)
-        return body
+        pybullet.resetBaseVelocity(self._cube, launch["velocity"].tolist(), spin.tolist(), **here)
+        if self.model in TOUCHING:
+            normal = np.array(ground.normal)
+            plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=normal.tolist(), **here)
+            body = pybullet.createMultiBody(0, plane, basePosition=(-size * normal).tolist(), **here)
+            # The frictions of two bodies are multiplied.
+            pybullet.changeDynamics(
+                body, -1, contactStiffness=_ENDLESS, contactDamping=0, lateralFriction=1, **_PLAIN, **here
+            )
 
-    def _add_ground(self) -> None:
-        normal = np.array(self.scene.ground.normal)
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_PLANE, planeNormal=normal.tolist(), physicsClientId=self._client
-        )
-        lowered = (-_SPHERE * self.scene.cube.radius * normal).tolist()
-        body = pybullet.createMultiBody(0, shape, basePosition=lowered, physicsClientId=self._client)
-        pybullet.changeDynamics(
-            body,
-            -1,
-            contactStiffness=_ENDLESS,
-            contactDamping=0,
-            lateralFriction=1,  # the two are multiplied
-            **_PLAIN,
-            physicsClientId=self._client,
-        )
+    def _next(self, row: Array, every: int) -> int:
+        left = every
+        while left:
+            batch = min(_BATCH, 1 << left.bit_length() - 1)
+            if batch != self._batch:
+                pybullet.setPhysicsEngineParameter(fixedTimeStep=self.h * batch, numSubSteps=batch, **self._here)
+                self._batch = batch
+            pybullet.stepSimulation(**self._here)
+            left -= batch
+        place, (x, y, z, w) = pybullet.getBasePositionAndOrientation(self._cube, **self._here)
+        velocity, spin = pybullet.getBaseVelocity(self._cube, **self._here)
+        row[:] = (*place, w, x, y, z, *velocity, *spin) if self.turns else (*place[self.axes], *velocity[self.axes])
+        return every
 
 
 _PLAIN = {"restitution": 0, "spinningFriction": 0, "rollingFriction": 0, "linearDamping": 0, "angularDamping": 0}
-
-
-def _top_speed(scene: Scene, launch: np.void) -> float:
-    """Return a speed [m/s] that no node exceeds within the duration, unless the run gains energy."""
-    physics = physics_of(scene)
-    fall = math.hypot(*launch["velocity"]) + physics.gravity * scene.duration
-    turning = math.hypot(*launch["angular_momentum"]) / math.sqrt(physics.mass * physics.inertia)
-    return math.hypot(fall, turning) * (1 + physics.reach * math.sqrt(physics.mass / physics.inertia))

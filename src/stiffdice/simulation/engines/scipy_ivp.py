@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from abc import abstractmethod
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -130,6 +131,10 @@ def room_of(scene: Scene, launch: States) -> Room:
     return room
 
 
+class _SpentError(Exception):
+    """All evaluations that were allowed are done."""
+
+
 class _Solver(Engine):
     """One run, told every h [s], standing where `advance` left it."""
 
@@ -137,17 +142,20 @@ class _Solver(Engine):
     PACKAGE = "scipy"
 
     def __post_init__(self) -> None:
-        """Take the scene's numbers, and the state of the launch."""
-        (launch,) = self.launch
+        physics, (launch,) = physics_of(self.scene), self.launch
+        energy = sum(float(part[0]) for part in energies(physics, start_of(self.scene, self.model)))
+        energy = max(energy, physics.mass * physics.gravity * physics.radius)
         parts = [launch["position"], launch["velocity"]]
+        sizes = [physics.radius] * 3 + [math.sqrt(2 * energy / physics.mass)] * 3
         if self.model in TURNING:
             parts += [launch["angular_momentum"], [1.0, 0.0, 0.0, 0.0]]
-        self._y, self._sizes = np.concatenate(parts), _sizes(self.scene, self.model)
+            sizes += [math.sqrt(2 * energy * physics.inertia)] * 3 + [1.0] * 4
+        self._y, self._sizes = np.concatenate(parts), np.array(sizes, float)  # natural sizes; see the module's words
         self._room = room_of(self.scene, self.launch)
         self._plain, self._slopes = equations(self.model)
         # A counter in Python takes a part of the time of an evaluation.
         self._slope: Slope = self._plain if self.most is None else self._counted
-        self._evaluations = 0
+        self._evaluations, self._limit = 0, math.inf if self.most is None else self.most
 
     def advance(self, states: States, every: int) -> int:
         """Fill `states`, shape (K,), with the state after each `every` further steps; return the force evaluations.
@@ -164,7 +172,7 @@ class _Solver(Engine):
                     found, evaluations = self._solve(times)
                     solution[: len(found)] = found
                 except _SpentError:
-                    evaluations = (self.most or 0) - before
+                    evaluations = int(self._limit) - before
         _states(MODELS[self.model], solution[1:], self._room, states)
         self._y = solution[-1]
         return evaluations
@@ -172,17 +180,13 @@ class _Solver(Engine):
     def _counted(self, t: float, y: Array, room: Room) -> Array:
         """Return dy/dt. Between two of these Python sees a signal, which within odeint it does not."""
         self._evaluations += 1
-        if self._evaluations > (self.most or 0):
+        if self._evaluations > self._limit:
             raise _SpentError
         return self._plain(t, y, room)
 
+    @abstractmethod
     def _solve(self, times: Array) -> tuple[Array, int]:
         """Return the solution at these times [s], shape (time, component), fewer if it fails, and evaluations."""
-        raise NotImplementedError
-
-
-class _SpentError(Exception):
-    """All evaluations that were allowed are done."""
 
 
 class Dop853(_Solver):
@@ -191,24 +195,17 @@ class Dop853(_Solver):
     SCHEME = "dop853"
 
     def _solve(self, times: Array) -> tuple[Array, int]:
-        evaluations = 0
-
-        def counted(t: float, y: Array) -> Array:
-            nonlocal evaluations
-            evaluations += 1
-            return self._slope(t, y, self._room)
-
-        solver = ode(counted)
+        before, solution = self._evaluations, [self._y]
+        solver = ode(self._counted).set_f_params(self._room)
         absolute = float(ABSOLUTE * self.tolerance * self._sizes.min())  # it takes one for all
         solver.set_integrator("dop853", rtol=self.tolerance, atol=absolute, nsteps=_MOST_STEPS)
         solver.set_initial_value(self._y, times[0])
-        solution = [self._y]
         for time in times[1:]:
             reached = solver.integrate(time)
             if not solver.successful():
                 break
             solution.append(reached)
-        return np.array(solution), evaluations
+        return np.array(solution), self._evaluations - before
 
 
 class Lsoda(_Solver):
@@ -251,12 +248,5 @@ class Radau(_Solver):
         return found.y.T, int(found.nfev + (len(self._y) + 1) * found.njev)
 
 
-def _sizes(scene: Scene, model: str) -> Array:
-    """Return a natural size of each component; see the module's words."""
-    physics = physics_of(scene)
-    energy = sum(float(part[0]) for part in energies(physics, start_of(scene, model)))
-    energy = max(energy, physics.mass * physics.gravity * physics.radius)
-    sizes = [physics.radius] * 3 + [math.sqrt(2 * energy / physics.mass)] * 3
-    if model in TURNING:
-        sizes += [math.sqrt(2 * energy * physics.inertia)] * 3 + [1.0] * 4
-    return np.array(sizes, float)
+# By the names of their schemes.
+SOLVERS: dict[str, type[Engine]] = {solver.SCHEME: solver for solver in (Dop853, Lsoda, Radau)}

@@ -15,7 +15,7 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 from stiffdice.report.methods import engines_note, name_of
 from stiffdice.report.number_format import readable
-from stiffdice.simulation.engines import stepper
+from stiffdice.simulation.engines import registry as engines
 
 _COLORS = (style.BLUE, style.ORANGE)
 _HATCH = "////"
@@ -30,7 +30,7 @@ def draw(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     figure = style.new_figure(title, width=8.5, height=0.5 * len(names) + 1.7)
     panel = figure.subplots()
     thick = 0.8 / len(problems)
-    hatches = [_HATCH if stepper.own_steps(names[k]) else None for k in order]
+    hatches = [_HATCH if engines.METHODS[names[k]].own_steps else None for k in order]
     for p, color in zip(range(len(problems)), _COLORS, strict=False):
         across = np.arange(len(names)) + (len(problems) - 1 - 2 * p) / 2 * thick
         look: dict[str, Any] = {"color": color, "edgecolor": "white", "linewidth": 0.5, "hatch": hatches}

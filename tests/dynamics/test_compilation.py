@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.kernel_cache import KernelFiles
+from stiffdice.dynamics.compilation import KernelFiles
 
 ROOT = Path(__file__).parents[2]
 KERNEL = {"code": bytes(range(256))}
@@ -88,7 +88,7 @@ def test_a_link_in_its_place_goes_and_what_it_points_at_stays(kernels, tmp_path_
 TWO = """
 import sys
 from pathlib import Path
-from stiffdice.dynamics.kernel_cache import KernelFiles
+from stiffdice.dynamics.compilation import KernelFiles
 kernels = KernelFiles(Path(sys.argv[1]), "march", "stamp")
 for k in range(400):
     if k % 7 == 0:

@@ -16,9 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import rounds
 
-from stiffdice.archive.compare.compare import compare
-from stiffdice.archive.compare.datasets import datasets_difference
-from stiffdice.archive.compare.values import difference, ulps
+from stiffdice.archive.compare import compare
+from stiffdice.archive.differences import datasets_difference, ulps, values_difference
 from stiffdice.cli import main as cli
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation, seal
@@ -87,7 +86,7 @@ def test_ulps_of_shorter_floats_are_their_own():
 def of(a, b, **about):
     """Compare two rows of values."""
     a, b = (xr.DataArray(np.asarray(part), dims="k", name="x", attrs=about) for part in (a, b))
-    return difference(a, b, lambda index: f"k {index[0]}")
+    return values_difference(a, b, lambda index: f"k {index[0]}")
 
 
 def test_kinds_of_difference_are_told_apart():
