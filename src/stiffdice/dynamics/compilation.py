@@ -70,6 +70,7 @@ setattr(numba.config, "CACHE_DIR", os.environ["NUMBA_CACHE_DIR"])  # noqa: B010 
 
 _DIGEST = hashlib.sha256().digest_size
 _LOADING: ContextVar[bool] = ContextVar("_LOADING", default=False)
+_TELLING: ContextVar[Callable[[], None] | None] = ContextVar("_TELLING", default=None)
 
 
 class NotStoredError(Exception):
@@ -84,6 +85,16 @@ def only_stored() -> Iterator[None]:
         yield
     finally:
         _LOADING.reset(token)
+
+
+@contextlib.contextmanager
+def telling(compiles: Callable[[], None]) -> Iterator[None]:
+    """Call a function before a kernel is compiled in the block."""
+    token = _TELLING.set(compiles)
+    try:
+        yield
+    finally:
+        _TELLING.reset(token)
 
 
 class KernelFiles:
@@ -154,6 +165,8 @@ class _KernelCache(FunctionCache):
         found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         if found is None and _LOADING.get():
             raise NotStoredError
+        if found is None and (compiles := _TELLING.get()) is not None:
+            compiles()
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -263,26 +276,12 @@ def njit(function: Any = None, **options: Any) -> Any:
     if function is None:
         return partial(njit, **options)
     options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
-<<<<<<< HEAD
-    cached = options.pop("cache", False)
-
-    def compiled(python: Callable[..., Any]) -> Any:
-        if not cached:
-            bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-            return _Part(python, targetoptions=bare, pipeline_class=_PartCompiler)
-        kernel = _Kernel(python, targetoptions=options | {"no_cfunc_wrapper": True})
-        kernel._cache = KernelCache(python)
-        return kernel
-
-    return compiled(*function) if function else compiled
-=======
     if not options.pop("cache", False):
         bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         return _Part(function, targetoptions=bare, pipeline_class=_PartCompiler)
-    kernel = _Kernel(function, targetoptions=options)
+    kernel = _Kernel(function, targetoptions=options | {"no_cfunc_wrapper": True})
     kernel._cache = _KernelCache(function)
     return kernel
->>>>>>> house
 
 
 def constant(value: Any) -> Any:
