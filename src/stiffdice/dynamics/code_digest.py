@@ -1,5 +1,7 @@
 """What code made a result: a digest of the sources that a module stands on."""
 
+from __future__ import annotations
+
 import ast
 import hashlib
 from functools import cache

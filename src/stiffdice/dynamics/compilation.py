@@ -6,6 +6,8 @@ versions that compile them. Each file in it begins with its own digest, and is k
 what does not match is compiled again.
 """
 
+from __future__ import annotations
+
 import contextlib
 import gc
 import hashlib
@@ -140,7 +142,7 @@ class _Locator(UserProvidedCacheLocator):
     """The folder chosen above, and no other: the others that numba tries would serve stale kernels."""
 
     @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator:
         return cls(py_func, py_file)
 
 

@@ -4,6 +4,8 @@ Under every contact law (`scene/ground.py`) the force is linear in depth and spe
 forms (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Energies of a state, for the time loop and for stored trajectories alike."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

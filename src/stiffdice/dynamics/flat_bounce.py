@@ -15,6 +15,8 @@ the ground keeps the cube: should the force come back before the surface is reac
 2ζb that it takes to bring it to zero again, and what is left of the motion lacks the energy to get out.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -1,5 +1,7 @@
 """What theory predicts, to draw over every measured curve."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

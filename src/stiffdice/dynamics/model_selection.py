@@ -13,6 +13,8 @@ centre stays above the ground is righted by every contact. On an edge or a corne
 the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
 

@@ -9,6 +9,8 @@ In compiled code only: `load`, `store`, `where`, `bits`; `+ − * /`, comparison
 `& | ^ ~`, `abs`, `max`, `math.sqrt`. A comparison gives a mask.
 """
 
+from __future__ import annotations
+
 import math
 import operator
 from collections.abc import Callable

@@ -1,5 +1,7 @@
 """What a kernel works on: the state of one rigid body, and the physics it moves in; and rotations of nodes."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

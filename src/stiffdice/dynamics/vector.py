@@ -4,6 +4,8 @@ The latter are solved by elimination without pivots: for matrices that are all b
 NumPy do the same through BLAS, which has other digits on other processors.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

@@ -11,6 +11,8 @@ They agree with the listings' order (`symplectic_euler.py`) to round-off, not to
 order.
 """
 
+from __future__ import annotations
+
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple

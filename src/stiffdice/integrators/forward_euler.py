@@ -5,6 +5,8 @@ hold it (Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I,
 velocity in equation 7, which makes all the difference: `symplectic_euler`.
 """
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

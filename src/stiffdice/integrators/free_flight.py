@@ -1,5 +1,7 @@
 """What schemes share: free flight in closed form, and sums of motions and wrenches, six numbers each."""
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

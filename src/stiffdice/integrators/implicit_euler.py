@@ -15,6 +15,8 @@ turns no sliding node around, and the matrix stays symmetric and positive defini
 as the rest (Steihaug and Wolfbrandt 1979, Math. Comp. 33, 521).
 """
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

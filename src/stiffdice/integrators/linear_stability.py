@@ -2,6 +2,8 @@
 steps that resolve both.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from functools import lru_cache

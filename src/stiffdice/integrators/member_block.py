@@ -1,5 +1,7 @@
 """The block of memory in which the batched kernel has its members, one in each lane, along the ground's axes."""
 
+from __future__ import annotations
+
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple

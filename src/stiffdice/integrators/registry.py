@@ -10,6 +10,8 @@ ended by a budget, within an interval. Work is counted, not timed: a run is the 
 apply to every scene and model also has `unfit(scene, model)`, which says why not.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import Any

@@ -7,6 +7,8 @@ Iserles, Munthe-Kaas, Nørsett and Zanna 2000, Acta Numerica 9, 215). A free fli
 stable for ωh < 2√2 and loses (ωh)⁶/72 of its energy in a small step (Hairer and Wanner, II, IV.2).
 """
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

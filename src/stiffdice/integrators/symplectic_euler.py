@@ -5,6 +5,8 @@ First order. Without damping it keeps an energy that differs from the true one b
 Euler"; its equation 7 with the new u_cm is what the listings compute.
 """
 
+from __future__ import annotations
+
 import math
 from collections import namedtuple
 from typing import Any

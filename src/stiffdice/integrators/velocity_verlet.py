@@ -8,6 +8,8 @@ is the classical scheme, symplectic and linearly stable for ωh < 2 (Hairer, Lub
 Integration, I.1.4). The next step cannot take over the last force: it is at the predicted velocity.
 """
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

@@ -1,5 +1,7 @@
 """`flying`: the weight alone. For a cube that nothing touches; it turns at the spin of its launch."""
 
+from __future__ import annotations
+
 from collections import namedtuple
 
 from stiffdice.dynamics.models import sliding, tumbling

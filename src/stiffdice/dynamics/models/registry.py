@@ -3,6 +3,8 @@
 What turns the cube, and what the ground touches, is said in `state.py`. The force is that of a cube near the ground.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

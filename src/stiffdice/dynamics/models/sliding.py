@@ -1,5 +1,7 @@
 """`sliding`: translation only, the paper's ground_cube.m. The cube keeps the orientation it starts with."""
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

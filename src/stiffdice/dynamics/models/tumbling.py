@@ -4,6 +4,8 @@ A cube's inertia is the same about every axis, so that the spin is L/I however t
 it (paper, section 2.1).
 """
 
+from __future__ import annotations
+
 import math
 from collections import namedtuple
 from typing import Any

@@ -4,6 +4,8 @@ Where `sliding` has no tangential motion it is the same to the last bit: frictio
 nodes are summed in the same order.
 """
 
+from __future__ import annotations
+
 from collections import namedtuple
 from typing import Any
 

@@ -9,6 +9,8 @@ The motion is a vector: position [m], velocity [m/s], angular momentum [kg m²/s
 turned the nodes since the vector was made; of a body that does not turn the last two stay as they are.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

@@ -4,6 +4,8 @@ The coefficients are those of the program DOP853: Hairer, Nørsett and Wanner, S
 2nd edition, section II.5. Systems here do not depend on time, so that the nodes c_i are not needed.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -13,6 +13,8 @@ With A and B the slopes of the accelerations a in the velocities u and in the pl
 alone: x follows from x' = u. Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5, IV.8 and VII.4.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

@@ -6,6 +6,8 @@ spin's axis, is not below c + c' s − A s²/2 after s; to go to that bound's ze
 touch-down and converges as Newton's method does (conservative advancement).
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 

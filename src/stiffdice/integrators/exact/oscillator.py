@@ -14,6 +14,8 @@ to a stuck cube, w ≪ cutoff, whose speed falls exponentially and ends as zero.
 has a closed form; the other is an integral over exp(−z).
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any, NamedTuple
 

@@ -17,6 +17,8 @@ A step of any length is exact, to round-off and what the motion makes of that. A
 the last place, which deep in a contact is as much as ω times that in the speed: long steps are more precise.
 """
 
+from __future__ import annotations
+
 import math
 from collections import namedtuple
 from typing import Any, NamedTuple
