@@ -49,8 +49,8 @@ _TIMING = {
 # A later round has that part of the work by which its shards are counted (`shards`), which is a generous guess.
 _LATER = 0.25
 
-# Where nothing is compiled yet, the first job of a kind compiles: of runs for each model and contact law, of sweeps for
-# each law, and of all else once.
+# Where nothing is compiled yet, the first job of a kind compiles: of runs and of sweeps for each model, and of all else
+# once.
 _COMPILING = {"trajectory": 4.0, "shard": 9.0, "experiment": 5.0, "timings": 5.0}
 
 # What takes `_SUM` seconds on the machine of `cost`: that many numbers added, each waiting for the one before.
@@ -75,18 +75,19 @@ class Job(NamedTuple):
 def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
     """Return about how long [s] the jobs that are due take; `cores` of them at a time, timings one by one.
 
-    A job takes as long as its progress says, else as it took before; one that never ended, as the median of its kind.
-    Of a kind of which none ended, as all that have; where none has, `pace` [s] for each of its weight.
+    A running job's rest is its weight's and, as it goes on, that of its progress. A job takes as long as it took before;
+    one that never ended, as the median of its kind; of a kind of which none ended, `pace` [s] for each of its weight.
     """
     known = []
     for (stage, name, _), weight, took, due, log in jobs:
         kind, elapsed, whole = f"shard {name.partition('/')[0]}" if stage == "shard" else stage, 0.0, took
         if log and log.begun:
             elapsed = (datetime.now(UTC) - log.begun).total_seconds()
-            whole = (log.written - log.begun).total_seconds() / log.progress if log.progress else took
+            if log.progress:
+                past, rest = (log.written - log.begun).total_seconds(), 1.0 - log.progress
+                whole = past + rest * (past + rest * weight * pace)
         known.append((kind, weight, whole, due, elapsed))
     ended = [(kind, whole / weight) for kind, weight, whole, _, _ in known if whole is not None]
-    pace = median(rate for _, rate in ended) if ended else pace
     rates = {kind: median(rate for other, rate in ended if other == kind) for kind in dict(ended)}
     shared, alone = [0.0], [0.0]
     for kind, weight, whole, due, elapsed in known:
@@ -115,11 +116,11 @@ def _work(study: Study, result: Result) -> tuple[float, set[tuple[str, ...]]]:
     name, _, part = result.name.partition("." if result.stage == "trajectory" else "/")
     match result.stage:
         case "trajectory":
-            return 0.0, {("run", study.runs[name].model, part)}
+            return 0.0, {("run", study.runs[name].model)}
         case "shard":
             sweep = study.sweeps[name]
             plan = shards.of(sweep)[part]
-            return plan.seconds * (_LATER if plan.round else 1.0), {(sweep.model, contact) for contact in sweep.contact}
+            return plan.seconds * (_LATER if plan.round else 1.0), {(sweep.model,)}
         case "experiment" | "timings":
             timed = result.stage == "timings"
             asked, table = (study.timings[name], _TIMING) if timed else (study.experiments[name], _EXPERIMENT)
