@@ -41,5 +41,5 @@ def test_what_is_stored_is_loaded_and_nothing_is_compiled(tmp_path):
     assert not list(tmp_path.rglob("*.nbc"))
     python(RUN, tmp_path)
     stored = sorted(tmp_path.rglob("*.nbc"))
-    assert python(LOAD, tmp_path).split() == [looks, "2"]  # one for each contact law
+    assert python(LOAD, tmp_path).split() == [looks, "1"]
     assert sorted(tmp_path.rglob("*.nbc")) == stored

@@ -75,8 +75,9 @@ class Job(NamedTuple):
 def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
     """Return about how long [s] the jobs that are due take; `cores` of them at a time, timings one by one.
 
-    A running job's rest is its weight's and, as it goes on, that of its progress. A job takes as long as it took before;
-    one that never ended, as the median of its kind; of a kind of which none ended, `pace` [s] for each of its weight.
+    A job takes as long as its progress says, the more the farther it is, as it may have compiled first; else as it took
+    before; one that never ended, as the median of its kind. Of a kind of which none ended, as all that have; where none
+    has, `pace` [s] for each of its weight.
     """
     known = []
     for (stage, name, _), weight, took, due, log in jobs:
@@ -84,10 +85,11 @@ def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
         if log and log.begun:
             elapsed = (datetime.now(UTC) - log.begun).total_seconds()
             if log.progress:
-                past, rest = (log.written - log.begun).total_seconds(), 1.0 - log.progress
-                whole = past + rest * (past + rest * weight * pace)
+                past, early = (log.written - log.begun).total_seconds(), (1.0 - log.progress) ** 4
+                whole = (1.0 - early) * past / log.progress + early * (past + (1.0 - log.progress) * weight * pace)
         known.append((kind, weight, whole, due, elapsed))
     ended = [(kind, whole / weight) for kind, weight, whole, _, _ in known if whole is not None]
+    pace = median(rate for _, rate in ended) if ended else pace
     rates = {kind: median(rate for other, rate in ended if other == kind) for kind in dict(ended)}
     shared, alone = [0.0], [0.0]
     for kind, weight, whole, due, elapsed in known:
