@@ -162,7 +162,7 @@ def held_contacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for f, column in enumerate(rows.T):
         there, (upper, lower) = dataset.isel(friction=f), column
         for s, color in enumerate(colors):
-            for panel, values in zip(column, (there.error, there.evaluations.astype(float)), strict=True):
+            for panel, values in zip(column, (there.error.values, there.evaluations.values), strict=True):
                 panel.plot(tolerance, np.nanmedian(values[s], axis=0), color=color, linewidth=1.2)
                 worst = np.nanmax(values[s], axis=0)
                 panel.plot(tolerance, worst, color=color, linestyle="none", marker=".", markersize=4)
