@@ -64,7 +64,8 @@ def test_verdicts_are_those_of_stepping(found):
         law = meanings_of(found.contact)[c]
         base = Scene() if axis in ("friction", "spin") else BASE
         value = (VALUES[axis] or chosen.values)[v]
-        scene = chosen.placed(base.with_ground(contact=law), value)
+        ground = base.with_ground(contact=law)
+        scene = chosen.placed(ground, value) if chosen.placed else ground.with_ground(**{axis: value})
         stepped = simulate(scene, model=found.attrs["model"], steps=steps, every=steps, stop={"energy": BLOW_UP - 1})
         assert verdict == stepped.verdict[0], (law, value, steps)
 

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from stiffdice.experiments.timing import SHORTEST, Launched, interleaved, machine, seconds_of
+from stiffdice.experiments.timing import SHORTEST, interleaved, machine
 
 
 class Clock:
@@ -36,7 +36,7 @@ def test_runs_take_turns_and_a_long_one_is_called_once(clock):
     calls = []
     seconds = {"a": 2 * SHORTEST, "long": 0.03, "b": 4 * SHORTEST}
     runs = [clock.run(cost, lambda name=name: calls.append(name)) for name, cost in seconds.items()]
-    median, spread = interleaved(runs, 3, 0.02)
+    median, spread = interleaved([lambda run=run: run for run in runs], 3, 0.02)
     assert calls == ["a", "long", "b"] + ["a", "b"] * 3
     assert median == pytest.approx(list(seconds.values()))
     assert spread == pytest.approx(0, abs=1e-12)
@@ -44,7 +44,7 @@ def test_runs_take_turns_and_a_long_one_is_called_once(clock):
 
 def test_a_short_run_is_repeated_until_the_clock_can_tell(clock):
     calls = []
-    median = interleaved([clock.run(SHORTEST / 100, lambda: calls.append(1))], 5, 1.0)[0][0]
+    median = interleaved([lambda: clock.run(SHORTEST / 100, lambda: calls.append(1))], 5, 1.0)[0][0]
     assert median == pytest.approx(SHORTEST / 100)
     assert len(calls) == pytest.approx(1 + 5 * 100, abs=5)
 
@@ -71,8 +71,5 @@ def test_what_makes_a_run_ready_is_not_timed(clock):
         order.append("ready")
         return clock.run(0.25, lambda: order.append("made"))
 
-    run = Launched(ready)
-    assert seconds_of(run, 3) == pytest.approx(0.25)
-    assert order == ["ready", "made"] * 3
-    run()
+    assert interleaved([ready], 3, 1.0)[0] == pytest.approx([0.25])
     assert order == ["ready", "made"] * 4

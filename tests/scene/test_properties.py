@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.scene.cube import GEOMETRIES, INERTIAS
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import NODE_VELOCITIES, PRESETS, Scene, changed, from_mapping
 
 positive = st.floats(1e-3, 1e6)

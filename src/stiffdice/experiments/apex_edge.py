@@ -11,14 +11,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.dynamics.contact import LAWS
-from stiffdice.dynamics.state import Array
-from stiffdice.experiments.measuring import bisected, mapped, numbers, span
+from stiffdice.experiments.measuring import bisected, mapped, numbers, result, span
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
@@ -61,47 +61,28 @@ def measure(
 
     def last_fail(law: str, seconds: float, height: float) -> list[float]:
         there = dataclasses.replace(scene.with_ground(contact=law), duration=seconds)
-        return [_last_fail(there, height, scan, members)]
+        launches = turned(there, MODEL, members)
+        judged: dict[str, Any] = {"criteria": _CRITERIA, "stop": _CRITERIA, "hop_height": height}
+        for value in scan.tolist():
+            steps = round(linear_theory.steps_for(there, value))
+            started = phased(there, MODEL, steps, members, launches)
+            run = simulate(there, model=MODEL, scheme=SCHEME, steps=steps, members=started, **judged)
+            if (run.measures[apex.MEASURE] > _LARGEST_RATIO).any():
+                return [linear_theory.omega_h(there, steps)]
+        return [math.nan]
+
+    fine = np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE).tolist()
+    gains = [(value, linear_theory.largest_gain(value)) for value in fine]
 
     def predicted(law: str, height: float) -> list[float]:
-        return [prediction(scene.with_ground(contact=law), height)]
+        ratio = returned(scene.with_ground(contact=law), height)
+        return [next((value for value, gain in gains if ratio * gain > _LARGEST_RATIO), math.nan)]
 
     found = mapped(last_fail, _MEASURED, contact=LAWS, duration=durations, hop_height=heights)
     found |= mapped(predicted, _PREDICTED, contact=LAWS, hop_height=heights)
-    title = "Edge of apex by hop height and duration"
-    attributes = dataset.provenance_attributes(title, scene, MODEL, SCHEME, __name__) | {
-        "members": members,
-        "criteria": dataset.criteria_text(_CRITERIA),
-        "scene_note": "contact law and duration are the table's, not the scene's",
-    }
-    return xr.Dataset(found, attrs=attributes)
-
-
-def _last_fail(scene: Scene, height: float, scan: Array, members: int) -> float:
-    """Return the first ωh of an ascending scan at which a member's apex rises; not-a-number if none does."""
-    launches = turned(scene, MODEL, members)
-    for omega_h in scan:
-        steps = round(linear_theory.steps_for(scene, float(omega_h)))
-        run = simulate(
-            scene,
-            model=MODEL,
-            scheme=SCHEME,
-            steps=steps,
-            members=phased(scene, MODEL, steps, members, launches),
-            criteria=_CRITERIA,
-            stop=_CRITERIA,
-            hop_height=height,
-        )
-        if (run.measures[apex.MEASURE] > _LARGEST_RATIO).any():
-            return float(linear_theory.omega_h(scene, steps))
-    return math.nan
-
-
-def prediction(scene: Scene, height: float) -> float:
-    """Return the smallest ωh [1] at which a rebound from a height [m] may go higher by more than `apex` tolerates."""
-    ratio = returned(scene, height)
-    scan = np.geomspace(0.01, linear_theory.STABILITY_LIMIT * (1 - 1e-9), _FINE).tolist()
-    return next((value for value in scan if ratio * linear_theory.largest_gain(value) > _LARGEST_RATIO), math.nan)
+    told = {"members": members, "criteria": dataset.criteria_text(_CRITERIA)}
+    told["scene_note"] = "contact law and duration are the table's, not the scene's"
+    return result(found, "Edge of apex by hop height and duration", scene, MODEL, SCHEME, __name__, **told)
 
 
 def returned(scene: Scene, height: float) -> float:
@@ -111,22 +92,16 @@ def returned(scene: Scene, height: float) -> float:
     """
     if height == 0:
         return 1.0
+    gravity, speed = scene.gravity, math.sqrt(2 * scene.gravity * height)
     drag = 8 * scene.ground.damping / scene.cube.mass if scene.ground.contact == "ungated" else 0.0
-    speed = _landing_speed(scene.gravity, drag, height)
-    return (flat_bounce.restitution(scene, speed) * speed) ** 2 / (2 * scene.gravity * height)
 
+    def fallen(speed: float) -> float:
+        """Return the height [m] −v/drag − g/drag² ln(1 − drag·v/g) of a fall from rest in v' = g − drag·v."""
+        part = drag * speed / gravity
+        if part < 1e-4:  # where the logarithm loses its digits, the first two terms of its series
+            return speed**2 / (2 * gravity) * (1 + 2 * part / 3)
+        return -gravity / drag**2 * (part + math.log1p(-part))
 
-def _landing_speed(gravity: float, drag: float, height: float) -> float:
-    """Return the speed [m/s] after a fall from rest in v' = g − drag·v: height = −v/drag − g/drag² ln(1 − drag·v/g)."""
-    free = math.sqrt(2 * gravity * height)
-    if drag == 0:
-        return free
-    return bisected(lambda speed: _fallen(gravity, drag, speed) < height, 0.0, min(free, gravity / drag))[0]
-
-
-def _fallen(gravity: float, drag: float, speed: float) -> float:
-    """Return the height [m] of a fall from rest that ends at a speed [m/s]."""
-    part = drag * speed / gravity
-    if part < 1e-4:  # where the logarithm loses its digits, the first two terms of its series
-        return speed**2 / (2 * gravity) * (1 + 2 * part / 3)
-    return -gravity / drag**2 * (part + math.log1p(-part))
+    if drag:
+        speed = bisected(lambda speed: fallen(speed) < height, 0.0, min(speed, gravity / drag))[0]
+    return (flat_bounce.restitution(scene, speed) * speed) ** 2 / (2 * gravity * height)

@@ -20,12 +20,11 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import Array, Ensemble, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import coordinates, mapped, quantity, scan, span
+from stiffdice.experiments.measuring import coordinates, mapped, quantity, result, scan, span
 from stiffdice.experiments.placement import contact_frequency, landing_speed, level
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation import dataset
 from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
@@ -59,8 +58,7 @@ def measure(
     values = scan(low, high, validation.count("count", count, at_least=2), [*magic.values(), *between])
     phase = np.arange(validation.count("phases", phases)) / phases
     omega, speed = contact_frequency(scene), landing_speed(scene)
-    if scene.gravity > _WEIGHT * omega * speed:
-        most = _WEIGHT * omega * speed
+    if scene.gravity > (most := _WEIGHT * omega * speed):
         raise InputError(f"gravity = {scene.gravity:g}: allowed is at most {_WEIGHT:g} ω v = {most:.3g} [m/s²]")
     heavy = level(scene, friction=0.0, damping=0.0)
     weightless = dataclasses.replace(heavy, gravity=0.0)
@@ -72,12 +70,11 @@ def measure(
 
     found = mapped(gains, _GAINS, omega_h=values) | coordinates(phase=phase)
     found["speed"] = quantity((), speed, "speed at which the cube meets the ground", "m s-1")
-    attributes = dataset.provenance_attributes("Energy of single bounces", scene, MODEL, SCHEME, __name__)
     note = (
         "launch, damping and friction are the experiment's, not the scene's, and gravity is off but for "
         "largest_with_gravity; ground: level, gated"
     )
-    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
+    return result(found, "Energy of single bounces", scene, MODEL, SCHEME, __name__, scene_note=note)
 
 
 def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
@@ -98,5 +95,4 @@ def _gain(scene: Scene, speed: float, h: float, phase: Array) -> Array:
     left = end["position"][:, 2] - scene.cube.side / 2
     assert left.min() > 0, "in the air again"
     upward = end["velocity"][:, 2] - lag
-    gain: Array = (upward**2 + 2 * scene.gravity * left) / speed**2 - 1
-    return gain
+    return np.asarray((upward**2 + 2 * scene.gravity * left) / speed**2 - 1)

@@ -10,7 +10,7 @@ import xarray as xr
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.contact import LAWS
-from stiffdice.experiments.measuring import coordinates, mapped
+from stiffdice.experiments.measuring import coordinates, mapped, result
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset, energy_budget
@@ -51,5 +51,5 @@ def measure(
     found = mapped(works, _WORKS, contact=LAWS, steps=taken) | coordinates(bounce=range(1, bounces + 1))
     omega_h = [linear_theory.omega_h(scene, count) for count in taken]
     found["omega_h"] = "steps", omega_h, dataset.CELL_ATTRIBUTES["omega_h"]
-    attributes = dataset.provenance_attributes("Ledger of the energy of bounces", scene, model, SCHEME, __name__)
-    return xr.Dataset(found, attrs=attributes | {"scene_note": "contact law is the dimension's, not the scene's"})
+    note = "contact law is the dimension's, not the scene's"
+    return result(found, "Ledger of the energy of bounces", scene, model, SCHEME, __name__, scene_note=note)

@@ -19,7 +19,7 @@ import xarray as xr
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TOUCHING, TURNING
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity
+from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity, result
 from stiffdice.experiments.placement import STARTS, at_clearance, clearance, contact_frequency, fall_speed, relaunched
 from stiffdice.integrators.linear_stability import fewest_steps, half_turn_steps
 from stiffdice.scene import validation
@@ -35,14 +35,13 @@ SCHEME = "symplectic_euler"
 _SPIN_ABOUT = np.array([1.0, 2.0, 3.0]) / math.sqrt(14)
 
 
-def _with_mass(scene: Scene, mass: float) -> Scene:
-    return dataclasses.replace(scene, cube=dataclasses.replace(scene.cube, mass=mass))
+def _with_cube(scene: Scene, **cube: Any) -> Scene:
+    return dataclasses.replace(scene, cube=dataclasses.replace(scene.cube, **cube))
 
 
 def _with_radius(scene: Scene, radius: float) -> Scene:
     """Return the scene with a true cube of this radius [m], launched as high above the ground as the scene's own."""
-    cube = dataclasses.replace(scene.cube, radius=radius, geometry="exact")
-    return at_clearance(dataclasses.replace(scene, cube=cube), clearance(scene))
+    return at_clearance(_with_cube(scene, radius=radius, geometry="exact"), clearance(scene))
 
 
 def _with_spin(scene: Scene, rate: float) -> Scene:
@@ -50,17 +49,13 @@ def _with_spin(scene: Scene, rate: float) -> Scene:
     return relaunched(scene, angular_momentum=tuple(momentum.tolist()))
 
 
-def _with_ground(key: str) -> Callable[[Scene, float], Scene]:
-    return lambda scene, value: scene.with_ground(**{key: value})
-
-
 class Axis(NamedTuple):
-    """One number of a scene, its values, and how a scene gets one of them, all else as it was."""
+    """One number of a scene, its values, and how a scene gets one of them, all else as it was; none: by its ground."""
 
     long_name: str
     units: str
     values: Sequence[Any]
-    placed: Callable[[Scene, Any], Scene]
+    placed: Callable[[Scene, Any], Scene] | None = None
 
 
 def _decades(first: int, last: int) -> list[float]:
@@ -68,10 +63,10 @@ def _decades(first: int, last: int) -> list[float]:
 
 
 AXES: dict[str, Axis] = {
-    "stiffness": Axis("ground stiffness", "kg s-2", [0.0, *_decades(-6, 16)], _with_ground("stiffness")),
-    "damping": Axis("ground damping", "kg s-1", [0.0, *_decades(-3, 12)], _with_ground("damping")),
-    "friction": Axis("friction coefficient", "1", [0.0, *_decades(-3, 3)], _with_ground("friction")),
-    "mass": Axis("mass of the cube", "kg", _decades(-9, 9), _with_mass),
+    "stiffness": Axis("ground stiffness", "kg s-2", [0.0, *_decades(-6, 16)]),
+    "damping": Axis("ground damping", "kg s-1", [0.0, *_decades(-3, 12)]),
+    "friction": Axis("friction coefficient", "1", [0.0, *_decades(-3, 3)]),
+    "mass": Axis("mass of the cube", "kg", _decades(-9, 9), lambda scene, mass: _with_cube(scene, mass=mass)),
     "radius": Axis("radius of the cube, exact geometry", "m", _decades(-9, 9), _with_radius),
     "spin": Axis("rate of spin at the launch", "rad s-1", [0.0, *_decades(-2, 12)], _with_spin),
     "start": Axis("start", "1", list(STARTS), lambda scene, name: STARTS[name](scene)),
@@ -110,27 +105,23 @@ def measure(
     budget = validation.count("budget", budget)
 
     def placed(law: str, value: Any) -> Scene:
+        if chosen.placed is None:
+            return scene.with_ground(contact=law, **{axis: value})
         return chosen.placed(scene.with_ground(contact=law), value)
 
     def verdict(law: str, value: Any, steps: int) -> list[np.int8]:
         return [_verdict(placed(law, value), model, steps, budget)]
 
-    grid: dict[str, Any] = {"contact": LAWS, "value": span}
-    found = mapped(verdict, {"verdict": ("verdict", "1")}, **grid, steps=counts)
+    found = mapped(verdict, {"verdict": ("verdict", "1")}, contact=LAWS, value=span, steps=counts)
     found["verdict"][2].update(dataset.VERDICT_ATTRIBUTES)
     found["value"][2].update(long_name=chosen.long_name, units=chosen.units)
     limits = [[_limits(placed(law, value), model) for value in span] for law in LAWS]
     text = "steps at a limit by theory: fewest for contact, drag, turn, most for stall"
-    found["limit_steps"] = quantity(("limit", *grid), np.moveaxis(np.array(limits), -1, 0), text)
+    found["limit_steps"] = quantity(("limit", "contact", "value"), np.moveaxis(np.array(limits), -1, 0), text)
     found |= coordinates(limit=LIMITS)
-    title = f"Verdicts from nothing to far beyond use: {axis}"
-    attributes = dataset.provenance_attributes(title, scene, model, SCHEME, __name__) | {
-        "axis": axis,
-        "budget": budget,
-        "criteria": dataset.criteria_text(tolerances_of(model)),
-        "scene_note": f"contact law and {axis} are the cell's, not the scene's",
-    }
-    return xr.Dataset(found, attrs=attributes)
+    told = {"axis": axis, "budget": budget, "criteria": dataset.criteria_text(tolerances_of(model))}
+    told["scene_note"] = f"contact law and {axis} are the cell's, not the scene's"
+    return result(found, f"Verdicts from nothing to far beyond use: {axis}", scene, model, SCHEME, __name__, **told)
 
 
 def _verdict(scene: Scene, model: str, steps: int, budget: int) -> np.int8:

@@ -16,11 +16,10 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import mapped, numbers
+from stiffdice.experiments.measuring import mapped, numbers, result
 from stiffdice.experiments.placement import STARTS, contact_frequency, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "sliding", "symplectic_euler"
@@ -67,20 +66,15 @@ def measure(
         raise InputError(f"step_size = {max(sizes):g}: allowed are numbers <= {longest:.3g} [s], ωh = {_LONGEST:g}")
 
     def swings(mu: float, h: float) -> tuple[float, float]:
-        return _swing(flat, mu, h, steps), max(0.0, mu * scene.gravity * h / 2 - cutoff)
+        # In a step what is off the swing shrinks by 1 − 4 cutoff/k: to 1e-4 in so many.
+        taken = steps + round(2.5 * mu * scene.gravity * h / cutoff)
+        sliding = relaunched(
+            STARTS["at_rest"](flat.with_ground(friction=mu)), velocity=(3 * mu * scene.gravity * h, 0.0, 0.0)
+        )
+        start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * taken), MODEL, taken, taken)
+        return np.abs(start()().states["velocity"][-_LAST:, 0]).max(), max(0.0, mu * scene.gravity * h / 2 - cutoff)
 
     found = mapped(swings, _SWINGS, friction=coefficients, step_size=sizes)
     found |= mapped(lambda mu: [2 * cutoff / (mu * scene.gravity)], _LEAST, friction=coefficients)
-    attributes = dataset.provenance_attributes("Chatter of a cube at rest", flat, MODEL, SCHEME, __name__)
     note = "friction and launch are the experiment's, not the scene's; ground: level, gated"
-    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
-
-
-def _swing(flat: Scene, friction: float, h: float, steps: int) -> float:
-    """Return the largest sliding speed [m/s] in the last steps of a cube that slid slowly, and should have stopped."""
-    # In a step what is off the swing shrinks by 1 − 4 cutoff/k: to 1e-4 in so many.
-    steps += round(2.5 * friction * flat.gravity * h / physics_of(flat).cutoff)
-    still = STARTS["at_rest"](flat.with_ground(friction=friction))
-    sliding = relaunched(still, velocity=(3 * friction * flat.gravity * h, 0.0, 0.0))
-    start = stepper.ready(SCHEME, dataclasses.replace(sliding, duration=h * steps), MODEL, steps, steps)
-    return float(np.abs(start()().states["velocity"][-_LAST:, 0]).max())
+    return result(found, "Chatter of a cube at rest", flat, MODEL, SCHEME, __name__, scene_note=note)

@@ -15,12 +15,11 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.state import STATE, Array
-from stiffdice.experiments.measuring import coordinates, mapped, numbers
+from stiffdice.experiments.measuring import coordinates, mapped, numbers, result
 from stiffdice.experiments.placement import relaunched
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import dataset
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.initial_conditions import turned
 
@@ -80,6 +79,5 @@ def measure(
         return apart[:-1], counts, apart[-1], reference
 
     found = mapped(compared, _DESCRIBED, **axes) | coordinates(tolerance=tolerances)
-    attributes = dataset.provenance_attributes("Corners held by friction", scene, MODEL, SCHEME, __name__)
     note = "friction, stiffness and orientation are those of the dimensions"
-    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
+    return result(found, "Corners held by friction", scene, MODEL, SCHEME, __name__, scene_note=note)

@@ -1,4 +1,4 @@
-"""What measuring takes: options checked, values to try, states of a run, and a function over a grid as variables."""
+"""What measuring takes: options checked, values to try, a function over a grid as variables, and these as a result."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from stiffdice.dynamics.state import STATE, Array, States
 from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.run import Run
 
@@ -21,7 +23,7 @@ Variable = tuple[str | Sequence[str], Any, dict[str, Any]]
 
 # Coordinates that files of runs and sweeps have, too.
 _KNOWN = dataset.CELL_ATTRIBUTES | {"axis": dataset.AXIS_ATTRIBUTES}
-# Meaning and unit of the others; one whose values are words is an enum.
+# Meaning and unit of the others, where the name does not say it; one whose values are words is an enum.
 _COORDINATES = {
     "approximation": ("model without rotation: with friction, and without", "1"),
     "bounce": ("number of the bounce", "1"),
@@ -32,16 +34,13 @@ _COORDINATES = {
     "hop_height": ("height from which rebounds count", "m"),
     "inertia": ("moment of inertia of the cube", "1"),
     "launch": ("orientation of the launch, 0 the scene's", "1"),
-    "limit": ("limit", "1"),
     "measure": ("error", "1"),
-    "method": ("method", "1"),
     "mode": ("contact mode", "1"),
     "nudge": ("nudge to a cube at rest on its face", "1"),
     "nudge_zeta": ("damping ratio of the nudged motion", "1"),
     "omega_h_relative": ("omega h of the nudged motion over its limit by theory", "1"),
     "phase": ("fraction of the step before the nodes meet the ground", "1"),
     "piece": ("piece of the full model that the scene does not need", "1"),
-    "problem": ("problem", "1"),
     "role": ("model with the piece, or without", "1"),
     "source": ("reference", "1"),
     "step_size": ("step size", "s"),
@@ -127,7 +126,7 @@ def coordinates(**axes: Iterable[Any]) -> dict[str, Variable]:
         if name in _KNOWN:
             attributes = _KNOWN[name]
         else:
-            meaning, unit = _COORDINATES[name]
+            meaning, unit = _COORDINATES.get(name, (name, "1"))
             attributes = enum_attributes(meaning, listed) if words else {"long_name": meaning, "units": unit}
         found[name] = name, data, attributes
     return found
@@ -150,3 +149,10 @@ def mapped(
         shape = *map(len, lists.values()), *data.shape[1:]
         variables[name] = quantity((*lists, *inner), data.reshape(shape), meaning, unit)
     return variables
+
+
+def result(
+    variables: Mapping[str, Variable], title: str, scene: Scene, model: str, scheme: str, code: str, **told: Any
+) -> xr.Dataset:
+    """Return variables with what says what made them: `dataset.provenance_attributes`, and other attributes."""
+    return xr.Dataset(variables, attrs=dataset.provenance_attributes(title, scene, model, scheme, code) | told)

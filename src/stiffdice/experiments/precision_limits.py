@@ -18,11 +18,10 @@ import xarray as xr
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import bisected, coordinates, quantity
+from stiffdice.experiments.measuring import bisected, coordinates, quantity, result
 from stiffdice.experiments.placement import STARTS, contact_frequency, fall_speed, height_above, level, relaunched
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import dataset
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import Run, simulate
 
@@ -64,10 +63,7 @@ def measure(
         # The first step falls by g h².
         "first_fall": ("s", _unchanged(still, "position", math.sqrt(_half_unit(z) / gravity))),
         "growth": ("1", _growth(stiff, omega_h, members)),
-        "square_of_frequency": (
-            "kg s-2",
-            _found(LARGEST / 4 * mass, lambda stiffness: 4 * stiffness / mass < math.inf),
-        ),
+        "square_of_frequency": ("kg s-2", _found(LARGEST / 4 * mass, lambda stiff: 4 * stiff / mass < math.inf)),
         "first_contact": ("kg s-2", _first_contact(bare, coarse)),
     }
     predicted, measured = zip(*(pair for _, pair in found.values()), strict=True)
@@ -75,14 +71,11 @@ def measure(
         "predicted": quantity("limit", list(predicted), "limit by its formula, in the unit that limit_units names"),
         "measured": quantity("limit", list(measured), "limit found in this code, in the unit that limit_units names"),
     }
-    attributes = dataset.provenance_attributes("Limits of double precision", bare, MODEL, SCHEME, __name__) | {
-        "scene_note": "ground: level, gated, without damping and friction; stiffness as the limit says",
-        "limit_units": "; ".join(f"{name}: {unit}" for name, (unit, _) in found.items()),
-        "bounce_stiffness": stiffness,
-        "bounce_omega_h": omega_h,
-        "coarse": coarse,
-    }
-    return xr.Dataset(variables, attrs=attributes)
+    note = "ground: level, gated, without damping and friction; stiffness as the limit says"
+    units = "; ".join(f"{name}: {unit}" for name, (unit, _) in found.items())
+    told = {"bounce_stiffness": stiffness, "bounce_omega_h": omega_h, "coarse": coarse}
+    title = "Limits of double precision"
+    return result(variables, title, bare, MODEL, SCHEME, __name__, scene_note=note, limit_units=units, **told)
 
 
 def _half_unit(value: float) -> float:
@@ -167,21 +160,17 @@ def _growth(scene: Scene, omega_h: float, members: int) -> Found:
     kappa = math.modf(math.pi / (2 * math.asin(omega_h / 2)))[0]
     predicted = fast * omega * omega_h / scene.gravity * (2 * (1 - kappa)) ** kappa * (2 * kappa) ** (1 - kappa)
     flight = 2 * fast / scene.gravity
+    x, y, z = scene.launch.position
     logs = []
     for member in range(members):
-        height = scene.launch.position[2] + member / members * fast * h
-        first, third = (_apart(scene, height, h, math.ceil((fall + (bounce - 0.5) * flight) / h)) for bounce in (1, 3))
+        height = z + member / members * fast * h
+        pair = [relaunched(scene, position=(x, y, at)) for at in (height, height + _APART * float(np.spacing(height)))]
+        counts = (math.ceil((fall + (bounce - 0.5) * flight) / h) for bounce in (1, 3))
+        speeds = [[_run(there, h, steps).end["velocity"][0, 2] for there in pair] for steps in counts]
+        first, third = np.abs(np.diff(speeds)).ravel().tolist()
         if first > 0 and third > 0:  # or they have fallen together
             logs.append(math.log(third / first) / 2)
     return predicted, math.exp(float(np.mean(logs)))
-
-
-def _apart(scene: Scene, height: float, h: float, steps: int) -> float:
-    """Return by how much the speeds of two runs differ that are launched some units in the last place apart [m/s]."""
-    x, y, _ = scene.launch.position
-    heights = height, height + _APART * float(np.spacing(height))
-    ends = [_run(relaunched(scene, position=(x, y, z)), h, steps).end["velocity"][0, 2] for z in heights]
-    return float(abs(ends[1] - ends[0]))
 
 
 def _first_contact(scene: Scene, coarse: int) -> Found:

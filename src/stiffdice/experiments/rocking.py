@@ -9,26 +9,25 @@ sag: for some ten steps above the limit, or wherever another mode is unstable.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
+from stiffdice.dynamics.state import STATE, Array, physics_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers
+from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers, result
 from stiffdice.experiments.placement import level
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation import dataset
+from stiffdice.simulation import fixed_step
 from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
@@ -92,23 +91,30 @@ def measure(
     nudge_zeta = _numbers("nudge_zeta", nudge_zeta, 0.0, 1.0)
     scan = _numbers("omega_h_relative", omega_h_relative, *_SCAN)
     steps = validation.count("steps", steps, at_least=20)
-    grounds = {inertia: _on_level_ground(scene, inertia) for inertia in INERTIAS}
+    lowest, highest = (part * scene.cube.side for part in _SAGS)
+    if not lowest <= linear_theory.sag(scene) <= highest:
+        raise InputError(
+            f"ground.stiffness = {scene.ground.stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by "
+            f"m g/(4 S); allowed is {lowest:.3g} to {highest:.3g} [m]"
+        )
+    bare = level(scene, friction=0.0, damping=0.0)
+    cubes = {inertia: dataclasses.replace(scene.cube, inertia=inertia) for inertia in INERTIAS}
+    grounds = {inertia: dataclasses.replace(bare, cube=cube) for inertia, cube in cubes.items()}
     modes = {(inertia, name): _mode(ground, name) for inertia, ground in grounds.items() for name in _TILTS}
     unit = scene.ground.stiffness / scene.cube.mass  # of ω² [rad²/s²]
 
     def limits(inertia: str, name: str) -> tuple[float, float, Array, Array]:
         mode = modes[inertia, name]
-        h = np.array([_limit(mode, value) for value in zeta])
+        h = np.array([_limit(scene, mode, value) for value in zeta])
         return mode.square / unit, mode.predicted / unit, h * np.sqrt(mode.predicted), h * np.sqrt(unit)
 
     def growth(inertia: str, nudge: str, value: float, relative: float) -> list[float]:
-        return [_growth(_nudged(grounds[inertia], modes[inertia, NUDGES[nudge]], value, relative, steps))]
+        return [_growth(grounds[inertia], modes[inertia, NUDGES[nudge]], value, relative, steps)]
 
     found = coordinates(zeta=zeta) | mapped(limits, _LIMITS, inertia=INERTIAS, mode=_TILTS)
     found |= mapped(growth, _GROWTH, inertia=INERTIAS, nudge=NUDGES, nudge_zeta=nudge_zeta, omega_h_relative=scan)
-    attributes = dataset.provenance_attributes("Limits of the contact modes", scene, MODEL, SCHEME, __name__)
     note = "inertia, damping and launch are the experiment's, not the scene's; ground: level, gated, without friction"
-    return xr.Dataset(found, attrs=attributes | {"scene_note": note})
+    return result(found, "Limits of the contact modes", scene, MODEL, SCHEME, __name__, scene_note=note)
 
 
 def _numbers(key: str, values: Sequence[float], least: float, most: float) -> list[float]:
@@ -118,64 +124,45 @@ def _numbers(key: str, values: Sequence[float], least: float, most: float) -> li
     return found
 
 
-def _on_level_ground(scene: Scene, inertia: str) -> Scene:
-    ground = level(scene, friction=0.0, damping=0.0)
-    lowest, highest = (part * scene.cube.side for part in _SAGS)
-    if not lowest <= linear_theory.sag(scene) <= highest:
-        raise InputError(
-            f"ground.stiffness = {scene.ground.stiffness:g}, gravity = {scene.gravity:g}: a cube at rest sinks in by "
-            f"m g/(4 S); allowed is {lowest:.3g} to {highest:.3g} [m]"
-        )
-    return dataclasses.replace(ground, cube=dataclasses.replace(scene.cube, inertia=inertia))
-
-
-class _Contact(NamedTuple):
-    """A cube on some of its nodes, and the pairs of states around it that differ in one coordinate each."""
-
-    scene: Scene
-    offsets: Array  # [m] (node, 3)
-    states: States  # (2 · 8,), all raised coordinates before all lowered ones
-    sizes: Array  # (8,) half the difference of a pair, in the units of `_weighted`
-
-
 class _Mode(NamedTuple):
-    """One mode of a contact."""
+    """One mode of a cube on some of its nodes."""
 
-    contact: _Contact
-    shape: Array  # (4,) of length one, in the first four of `_weighted`
+    step: Callable[[float, float], Array]  # of `_linearised`
+    shape: Array  # (4,) of length one, in the first four coordinates of the step
     square: float  # ω² as measured [rad²/s²]
     predicted: float  # ω² by theory [rad²/s²]
 
 
-def _contact(scene: Scene, tilt: Sequence[float]) -> _Contact:
-    """Press the cube into the ground on the nodes that `tilt` leaves lowest."""
-    side, mass, inertia = scene.cube.side, scene.cube.mass, scene.cube.moment_of_inertia
-    offsets = rotated(scene.cube.node_offsets(), np.array(tilt) * _LIFT)
-    move = _DIFFERENCE * side * np.sqrt(mass)
-    sizes = np.repeat([move, move * np.sqrt(scene.ground.stiffness / mass)], 4)
-    states = np.zeros(16, STATE)
-    states["position"][:, 2] = -offsets[:, 2].min() - _PRELOAD * side
-    states["node_offset"] = offsets
-    for state, change in zip(states, np.concatenate([np.diag(sizes), np.diag(-sizes)]), strict=True):
-        state["position"][2] += change[0] / np.sqrt(mass)
-        state["node_offset"] = rotated(offsets, change[1:4] / np.sqrt(inertia))
-        state["velocity"][2] = change[4] / np.sqrt(mass)
-        state["angular_momentum"] = change[5:] * np.sqrt(inertia)
-        state["angular_velocity"] = change[5:] / np.sqrt(inertia)
-    return _Contact(scene, offsets, states, sizes)
+def _linearised(scene: Scene, offsets: Array) -> Callable[[float, float], Array]:
+    """Return what gives, for a damping [kg/s] and a step size [s], the linear map of a compiled step, shape (8, 8).
 
+    It is that around a cube with these node offsets, pressed into the ground on the lowest: height and rotation vector,
+    then their rates, weighted by √M, by central differences. The cube is not in balance: weight and preload drop out,
+    being the same in both states of a pair.
+    """
+    side, mass, inertia = scene.cube.side, np.sqrt(scene.cube.mass), np.sqrt(scene.cube.moment_of_inertia)
+    move = _DIFFERENCE * side * mass
+    sizes = np.repeat([move, move * np.sqrt(scene.ground.stiffness / scene.cube.mass)], 4)
+    states = np.zeros((16, 2), STATE)  # raised coordinates before lowered ones, each before and after the step
+    states["position"][..., 2] = -offsets[:, 2].min() - _PRELOAD * side
+    for state, change in zip(states[:, 0], np.concatenate([np.diag(sizes), np.diag(-sizes)]), strict=True):
+        state["position"][2] += change[0] / mass
+        state["node_offset"] = rotated(offsets, change[1:4] / inertia)
+        state["velocity"][2] = change[4] / mass
+        state["angular_momentum"] = change[5:] * inertia
+        state["angular_velocity"] = change[5:] / inertia
 
-def _weighted(scene: Scene, offsets: Array, states: States) -> Array:
-    """Return height and rotation vector from `offsets`, then their rates, shape (state, 8), weighted by √M."""
-    mass, inertia = np.sqrt(scene.cube.mass), np.sqrt(scene.cube.moment_of_inertia)
-    return np.column_stack(
-        [
-            states["position"][:, 2] * mass,
-            _rotation(offsets, states["node_offset"]) * inertia,
-            states["velocity"][:, 2] * mass,
-            states["angular_momentum"] / inertia,
-        ]
-    )
+    def step(damping: float, h: float) -> Array:
+        physics = physics_of(scene.with_ground(damping=damping))
+        for pair in states:
+            fixed_step.advance(*_TAGS, physics, pair, 1, h, schemes.TOLERANCE)
+        after = states[:, 1]
+        rates = [after["velocity"][:, 2] * mass, after["angular_momentum"] / inertia]
+        turned = _rotation(offsets, after["node_offset"]) * inertia
+        raised, lowered = np.split(np.column_stack([after["position"][:, 2] * mass, turned, *rates]), 2)
+        return np.asarray(((raised - lowered) / (2 * sizes[:, None])).T)
+
+    return step
 
 
 def _rotation(offsets: Array, turned: Array) -> Array:
@@ -183,66 +170,48 @@ def _rotation(offsets: Array, turned: Array) -> Array:
 
     Σ r × (φ × r) = ⅔ Σ r² φ over a cube's nodes; exact to φ³.
     """
-    rotation: Array = np.cross(offsets, turned).sum(axis=-2) / (2 / 3 * np.sum(offsets**2))
-    return rotation
-
-
-def _jacobian(contact: _Contact, damping: float, h: float) -> Array:
-    """Return the linear map of one compiled step around the pressed cube, shape (8, 8), by central differences.
-
-    The cube is not in balance: weight and preload drop out, being the same in both states of a pair.
-    """
-    physics = physics_of(contact.scene.with_ground(damping=damping))
-    after = contact.states.copy()
-    _step_each(*_TAGS, physics, after, h)
-    raised, lowered = np.split(_weighted(contact.scene, contact.offsets, after), 2)
-    jacobian: Array = ((raised - lowered) / (2 * contact.sizes[:, None])).T
-    return jacobian
-
-
-@njit(cache=True)
-def _step_each(scheme: Any, model: Any, law: Any, physics: Physics, states: States, h: float) -> None:
-    """Advance each state by one step of h [s]."""
-    for k in range(states.shape[0]):
-        schemes.step(scheme, model, law, physics, states[k], h, schemes.TOLERANCE)
+    return np.asarray(np.cross(offsets, turned).sum(axis=-2) / (2 / 3 * np.sum(offsets**2)))
 
 
 def _mode(scene: Scene, name: str) -> _Mode:
     """Find a mode in the stiffness that the step itself shows: rates change by −h M⁻¹K times the displacements."""
-    contact = _contact(scene, _TILTS[name])
-    h = np.sqrt(scene.cube.mass / scene.ground.stiffness)
-    stiffness = -_jacobian(contact, 0.0, h)[4:, :4] / h
+    upright = scene.cube.node_offsets()
+    offsets = rotated(upright, np.array(_TILTS[name]) * _LIFT)
+    step, h = _linearised(scene, offsets), np.sqrt(scene.cube.mass / scene.ground.stiffness)
+    stiffness = -step(0.0, h)[4:, :4] / h
     squares, shapes = np.linalg.eigh((stiffness + stiffness.T) / 2)
     bounce = np.arange(4) == np.argmax(np.abs(shapes[0]))
     found = np.argmax(np.where({"face_bounce": bounce, "face_rocking": ~bounce}.get(name, True), squares, 0.0))
-    touching = contact.offsets[:, 2] < contact.offsets[:, 2].min() + _PRELOAD * scene.cube.side
-    modes = linear_theory.contact_modes(scene, scene.cube.node_offsets(), touching)
+    touching = offsets[:, 2] < offsets[:, 2].min() + _PRELOAD * scene.cube.side
+    modes = linear_theory.contact_modes(scene, upright, touching)
     predicted = modes[np.argmin(np.abs(modes - squares[found]))]
-    return _Mode(contact, shapes[:, found], float(squares[found]), float(predicted))
+    return _Mode(step, shapes[:, found], float(squares[found]), float(predicted))
 
 
-def _limit(mode: _Mode, zeta: float) -> float:
+def _limit(scene: Scene, mode: _Mode, zeta: float) -> float:
     """Return the step size [s] at which the spectral radius of the step, seen in this mode, passes one.
 
     By bisection, which is right here and nowhere in a sweep: contact is kept, so that the map is linear, and an
     eigenvalue leaves the unit circle at −1 only, where (ωh)² + 4ζωh − 4 has its one positive root.
     """
     omega = np.sqrt(mode.predicted)
-    damping = 2 * zeta * mode.contact.scene.ground.stiffness / omega
+    damping = 2 * zeta * scene.ground.stiffness / omega
     inside = np.kron(np.eye(2), mode.shape[:, None])  # a motion in this mode alone, (8, 2)
 
     def stable(h: float) -> bool:
-        step = inside.T @ _jacobian(mode.contact, damping, h) @ inside
+        step = inside.T @ mode.step(damping, h) @ inside
         return bool(np.abs(np.linalg.eigvals(step)).max() <= 1 + _TINY)
 
     return bisected(stable, 0.0, 2 * linear_theory.STABILITY_LIMIT / omega, relative=1e-10)[0]
 
 
-def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> Array:
-    """Return what becomes of a nudge to the cube at rest, [m] or [rad], from step to step while it is small.
+def _growth(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int) -> float:
+    """Return the factor [1] by which a nudge to the cube at rest grows in a step, while it is small.
 
     zeta, relative: damping ratio, and ωh in units of its limit, of the nudged motion. A cube that is tipped at rest is
-    toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I.
+    toppled by its weight with m g s/2 per radian: ω² of rocking is less by that over I. A motion of one mode follows
+    x₂ = a x₁ − b x₀: a and b by least squares, the growth is the larger modulus of the roots of λ² = aλ − b. Where they
+    meet, at the limit without damping, only half of its digits are known.
     """
     half, sag = scene.cube.side / 2, linear_theory.sag(scene)
     tips = abs(mode.shape[0]) < 0.5
@@ -257,14 +226,6 @@ def _nudged(scene: Scene, mode: _Mode, zeta: float, relative: float, steps: int)
     motion = _rotation(upright, state["node_offset"])[:, 0] if tips else state["position"][:, 2] - (half - sag)
     heights = state["position"][:, 2:] + state["node_offset"][:, upright[:, 2] < 0, 2]
     small = np.abs(heights + sag).max(axis=1) <= _FOLLOWED * sag
-    return np.asarray(motion[: len(small) if small.all() else int(np.argmin(small))])
-
-
-def _growth(motion: Array) -> float:
-    """Return the factor [1] by which a motion of one mode grows in a step.
-
-    Such a motion follows x₂ = a x₁ − b x₀: a and b by least squares, the growth is the larger modulus of the roots of
-    λ² = aλ − b. Where they meet, at the limit without damping, only half of its digits are known.
-    """
+    motion = motion[: len(small) if small.all() else int(np.argmin(small))]
     a, b = np.linalg.lstsq(np.column_stack([motion[1:-1], -motion[:-2]]), motion[2:], rcond=None)[0]
     return float(np.abs(np.roots([1.0, -a, b])).max())

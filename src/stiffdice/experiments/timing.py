@@ -10,10 +10,8 @@ import math
 import os
 import platform
 import re
-import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -28,33 +26,25 @@ SHORTEST = 1e-3
 _PACKAGES = ("stiffdice", "numpy", "numba", "scipy")
 
 
-@dataclass(frozen=True)
-class Launched:
-    """A run that is made ready before each call, off the clock: `ready` returns what is timed."""
-
-    ready: Callable[[], Callable[[], Any]]
-
-    def __call__(self) -> object:
-        """Make the run ready, and make it."""
-        return self.ready()()
-
-
-def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: float) -> tuple[Array, Array]:
+def interleaved(
+    starts: Sequence[Callable[[], Callable[[], object]]], rounds: int, affordable: float
+) -> tuple[Array, Array]:
     """Return each run's median time of a call [s], and half the range between the quartiles over it, shape (run,).
 
-    Runs take turns in each round, so that a slow moment of the machine hits all, and are warm: each has been called
-    before. affordable [s]: one that takes longer is called once.
+    starts: make a run ready, off the clock, and return what is timed. Runs take turns in each round, so that a slow
+    moment of the machine hits all, and are warm: each has been called before. affordable [s]: one that takes longer is
+    called once.
     """
-    once = [seconds_of(run) for run in runs]
+    once = [seconds_of(start()) for start in starts]
     repeats = [math.ceil(SHORTEST / max(seconds, 1e-9)) for seconds in once]
     samples: list[list[float]] = [[] if seconds <= affordable else [seconds] for seconds in once]
     gc.collect()
     gc.disable()
     try:
         for _ in range(rounds):
-            for k, run in enumerate(runs):
+            for k, start in enumerate(starts):
                 if once[k] <= affordable:
-                    samples[k].append(seconds_of(run, repeats[k]))
+                    samples[k].append(float(np.mean([seconds_of(start()) for _ in range(repeats[k])])))
     finally:
         gc.enable()
     quartiles = np.array([np.quantile(part, (0.25, 0.5, 0.75)) for part in samples]).reshape(-1, 3)
@@ -63,8 +53,6 @@ def interleaved(runs: Sequence[Callable[[], object]], rounds: int, affordable: f
 
 def seconds_of(run: Callable[[], object], repeats: int = 1) -> float:
     """Return the wall time of a call [s], the mean of so many in a row."""
-    if isinstance(run, Launched):
-        return sum(seconds_of(run.ready()) for _ in range(repeats)) / repeats
     begun = time.perf_counter()
     for _ in range(repeats):
         run()
@@ -73,22 +61,17 @@ def seconds_of(run: Callable[[], object], repeats: int = 1) -> float:
 
 def machine() -> dict[str, Any]:
     """Return the attributes that say where and with what times were taken."""
-    return {
-        "machine_processor": _processor(),
-        "machine_cores": os.cpu_count() or 0,
-        "machine_load_1_minute": round(os.getloadavg()[0], 2),
-        "machine_system": platform.platform(),
-        "versions": "; ".join(
-            [f"python {sys.version.split()[0]}", *(f"{package} {version(package)}" for package in _PACKAGES)]
-        ),
-        "measured_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-    }
-
-
-def _processor() -> str:
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:
         text = ""
     name = re.search(r"^model name\s*: *(.+?) *$", text, re.MULTILINE)
-    return name[1] if name else platform.machine()
+    packages = [f"{package} {version(package)}" for package in _PACKAGES]
+    return {
+        "machine_processor": name[1] if name else platform.machine(),
+        "machine_cores": os.cpu_count() or 0,
+        "machine_load_1_minute": round(os.getloadavg()[0], 2),
+        "machine_system": platform.platform(),
+        "versions": "; ".join([f"python {platform.python_version()}", *packages]),
+        "measured_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    }

@@ -31,11 +31,9 @@ def labelled(dataset: xr.Dataset) -> xr.Dataset:
 
     So `sel(axis="z")` of a run, `sel(contact="gated")` of a frontier, and of a sweep, for all cells of that law.
     """
-    words = {str(name): _words(part) for name, part in dataset.variables.items() if _FLAGS[1] in part.attrs}
+    words = {}
+    for name, part in dataset.variables.items():
+        if _FLAGS[1] in part.attrs:
+            attributes = {key: value for key, value in part.attrs.items() if key not in _FLAGS}
+            words[str(name)] = xr.Variable(part.dims, np.array(meanings_of(part))[part.values], attributes)
     return dataset.assign(words)
-
-
-def _words(variable: xr.Variable) -> xr.Variable:
-    texts = np.array(meanings_of(variable))[variable.values]
-    attributes = {name: value for name, value in variable.attrs.items() if name not in _FLAGS}
-    return xr.Variable(variable.dims, texts, attributes)

@@ -8,6 +8,7 @@ its bits: 0.0 and -0.0 differ; NaN is one value, whatever its sign and payload.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -21,9 +22,6 @@ CELL = ("contact", "stiffness", "steps")
 # The SHA-256 of each of some cells, shape (cell,).
 DIGEST = np.dtype("V32")
 Digests = npt.NDArray[np.void]
-
-_LENGTH = 8  # bytes of the number that says how long a piece is
-_BLOCK = 1 << 22  # bytes of cells to put in rows at a time
 
 Plain = str | int | float | tuple[Any, ...]
 
@@ -47,50 +45,32 @@ def cell_digests(part: xr.Dataset) -> Digests:
     their types and what other dimensions they have; no attributes. Raises TypeError for types not in our shards, text
     among them.
     """
-    head = [b"stiffdice cell 1"]
-    values = []
+    head, columns = [b"stiffdice cell 1"], []
     for name in sorted(str(name) for name, variable in part.variables.items() if "cell" in variable.dims):
         variable = part.variables[name].transpose("cell", ...)
         if variable.dtype.kind not in "biuf":
             raise TypeError(f"a variable of cells of type {variable.dtype}")
         others = " ".join(f"{dimension}={size}" for dimension, size in list(variable.sizes.items())[1:])
         head += [name.encode(), others.encode(), type_of(variable.dtype).encode()]
-        values.append(variable.values)
-    start = hashlib.sha256(b"".join(_length(len(piece)).tobytes() + piece for piece in head))
-    count = part.sizes["cell"]
-    width = sum(array.nbytes for array in values) // max(1, count)
-    step = max(1, _BLOCK // max(1, width))
+        image = np.array(variable.values, variable.dtype.newbyteorder("<"), order="C")
+        if image.dtype.kind == "f":
+            image[np.isnan(image)] = np.nan
+        image = image.reshape(len(image), math.prod(image.shape[1:])).view(np.uint8)
+        length = np.frombuffer(_length(image.shape[1]), np.uint8)
+        columns += [np.broadcast_to(length, (len(image), len(length))), image]
+    start = hashlib.sha256(b"".join(_length(len(piece)) + piece for piece in head))
     digests = []
-    for first in range(0, count, step):
-        for row in _rows([array[first : first + step] for array in values]):
-            digest = start.copy()
-            digest.update(row.data)
-            digests.append(digest.digest())
+    # In one row for each cell its pieces: one call for it instead of two for each of its variables, as a sweep may have
+    # millions of cells of one member.
+    for row in np.concatenate(columns, axis=1):
+        digest = start.copy()
+        digest.update(row.data)
+        digests.append(digest.digest())
     return np.frombuffer(b"".join(digests), DIGEST)
 
 
-def _rows(values: list[npt.NDArray[Any]]) -> npt.NDArray[np.uint8]:
-    """Return in one row for each cell its pieces one after another, each with its length before it: what is hashed.
-
-    One call for a cell instead of two for each of its variables: a sweep may have millions of cells of one member.
-    """
-    columns = []
-    for array in values:
-        image = _canonical(array).reshape(len(array), -1).view(np.uint8)
-        columns += [np.broadcast_to(_length(image.shape[1]), (len(array), _LENGTH)), image]
-    return np.concatenate(columns, axis=1)
-
-
-def _length(count: int) -> npt.NDArray[np.uint8]:
-    return np.frombuffer(count.to_bytes(_LENGTH, "little"), np.uint8)
-
-
-def _canonical(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return numbers in one piece, little endian, with one NaN."""
-    image = np.array(values, values.dtype.newbyteorder("<"), order="C")
-    if image.dtype.kind == "f":
-        image[np.isnan(image)] = np.nan
-    return image
+def _length(count: int) -> bytes:
+    return count.to_bytes(8, "little")
 
 
 def plain(value: Any) -> Plain:

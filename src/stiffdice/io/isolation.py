@@ -11,17 +11,17 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io.checked_file import check_values, opened, told
+from stiffdice.io.structure_check import check_values, opened, told
 
 SECONDS = 60  # of processor time that a file may take
 PATIENCE = 5  # times as long on the clock, of a machine with other things to do
@@ -72,28 +72,8 @@ def tried(paths: Sequence[str]) -> tuple[list[list[str] | None], int]:
     return [json.loads(answer) for answer in answers], child.returncode
 
 
-def _read_all(path: str) -> None:
-    """Read every value of a file, a piece at a time; raises InputError, naming the file, if it cannot be trusted."""
-    with told(path), opened(path) as (file, contents):
-        for name, variable in contents.variables.items():
-            for piece in _pieces(file[name]):
-                check_values(name, variable, piece)
-
-
-def _pieces(dataset: h5py.Dataset) -> Iterator[np.ndarray]:
-    if dataset.chunks is None:
-        yield np.asarray(dataset[()])
-    elif dataset.size:
-        for place in dataset.iter_chunks():
-            yield dataset[place]
-
-
 def _limit(seconds: int) -> None:
     """Let this process have so many more seconds of processor time, and no more than its share of memory."""
-    try:
-        import resource
-    except ImportError:  # not everywhere
-        return
     signal.alarm(seconds * PATIENCE)
     used = resource.getrusage(resource.RUSAGE_SELF)
     end = int(used.ru_utime + used.ru_stime) + 1 + seconds
@@ -104,12 +84,18 @@ def _limit(seconds: int) -> None:
 
 
 def _serve() -> None:
+    """Answer for each file with what is wrong, once every value was read, a piece at a time."""
     print("ready", flush=True)
     for path in json.load(sys.stdin):
         _limit(SECONDS)
         answer = None
         try:
-            _read_all(path)
+            with told(path), opened(path) as (file, contents):
+                for name, variable in contents.variables.items():
+                    stored = file[name]
+                    places = [()] if stored.chunks is None else stored.iter_chunks() if stored.size else []
+                    for place in places:
+                        check_values(name, variable, np.asarray(stored[place]))
         except InputError as error:
             answer = [type(error).__name__, str(error)]
         print(json.dumps(answer), flush=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,7 @@ import xarray as xr
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation
 from stiffdice.io.cf_enums import labelled
-from stiffdice.io.checked_file import check_values, opened, told
-from stiffdice.io.structure_check import Contents
+from stiffdice.io.structure_check import Contents, check_values, opened, told
 
 # Of a file of runs about so many are in memory at a time; a run takes some 130 bytes.
 RUNS_AT_ONCE = 1 << 14
@@ -64,8 +64,15 @@ def parts(path: str | Path, cells: int | None = None) -> Iterator[xr.Dataset]:
             if not growing:
                 raise RefusedError(f"{path}: has no dimension cell; not a file of runs")
             others = {name: _values(file, contents, name) for name in contents.variables.keys() - growing}
-        sizes = _sizes(file, contents)
-        count = cells or _cells_at_once(file, contents, sizes.get("member", 1))
+        shapes = ((variable.dimensions, file[name].shape) for name, variable in contents.variables.items())
+        sizes = dict(chain.from_iterable(zip(*pair, strict=True) for pair in shapes))
+        chunks = (
+            file[name].chunks[variable.dimensions.index("cell")]
+            for name, variable in contents.variables.items()
+            if {"cell", "member"} <= set(variable.dimensions) and file[name].chunks
+        )
+        together = max(chunks, default=1)  # whole chunks, so that none is unpacked twice
+        count = cells or together * max(1, RUNS_AT_ONCE // (together * max(1, sizes.get("member", 1))))
         for first in range(0, sizes["cell"], count):
             with told(path):
                 part = _dataset(
@@ -93,25 +100,6 @@ def some(path: str | Path, cells: Sequence[int], members: slice) -> dict[str, np
             for name, variable in contents.variables.items()
             if variable.dimensions[:2] == ("cell", "member")
         }
-
-
-def _cells_at_once(file: h5py.File, contents: Contents, members: int) -> int:
-    """Return how many cells to read at a time: whole chunks, so that none is unpacked twice."""
-    chunks = (
-        file[name].chunks[variable.dimensions.index("cell")]
-        for name, variable in contents.variables.items()
-        if {"cell", "member"} <= set(variable.dimensions) and file[name].chunks
-    )
-    together = max(chunks, default=1)
-    return together * max(1, RUNS_AT_ONCE // (together * max(1, members)))
-
-
-def _sizes(file: h5py.File, contents: Contents) -> dict[str, int]:
-    return {
-        dimension: size
-        for name, variable in contents.variables.items()
-        for dimension, size in zip(variable.dimensions, file[name].shape, strict=True)
-    }
 
 
 def _values(file: h5py.File, contents: Contents, name: str, first: int = 0, end: int | None = None) -> np.ndarray:

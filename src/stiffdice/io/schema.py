@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -284,15 +284,29 @@ def problems(dataset: xr.Dataset) -> list[str]:
     version = _numbers(dataset.attrs.get("format_version", FORMAT_VERSION))
     if version < _numbers("1.2"):
         return []
-    kind = dataset.attrs.get("kind")
+    kind, told = dataset.attrs.get("kind"), dataset.attrs
     if kind not in KINDS:
         return [f"attribute kind = {kind}: allowed is {' or '.join(KINDS)}"]
-    wrong = [
-        *_wrong_attributes(dataset, {**ATTRIBUTES, **KINDS[kind].attributes}),
-        *_wrong_variables(dataset, KINDS[kind].variables, version),
-    ]
-    text = dataset.attrs.get("config")
-    if isinstance(text, str) and hashlib.sha256(text.encode()).hexdigest() != dataset.attrs.get("config_digest"):
+    wrong = []
+    for name, attribute in {**ATTRIBUTES, **KINDS[kind].attributes}.items():
+        if name in told and not _is(attribute.type, told[name]):
+            wrong.append(f"attribute {name} = {str(told[name])[:40]}: allowed is a {attribute.type}")
+        elif name not in told and attribute.need == REQUIRED:
+            wrong.append(f"attribute {name} is missing")
+    for name, variable in KINDS[kind].variables.items():
+        if name in dataset.variables:
+            found = dataset[name]
+            for what, theirs, ours in (
+                ("dimensions", " ".join(map(str, found.dims)), " ".join(variable.dimensions)),
+                ("type", found.dtype.str[1:], variable.type),
+                ("units", found.attrs.get("units"), variable.units),
+            ):
+                if ours != theirs:
+                    wrong.append(f"{name} has {what} {theirs}: allowed is {ours}")
+        elif variable.need == REQUIRED and version >= _numbers(variable.since):
+            wrong.append(f"variable {name} is missing")
+    text = told.get("config")
+    if isinstance(text, str) and hashlib.sha256(text.encode()).hexdigest() != told.get("config_digest"):
         wrong.append("attribute config is not that of config_digest")
     return wrong
 
@@ -301,34 +315,8 @@ def _numbers(version: str) -> tuple[int, ...]:
     return tuple(map(int, version.split(".")))
 
 
-def _wrong_attributes(dataset: xr.Dataset, known: Mapping[str, Attribute]) -> Iterator[str]:
-    for name, attribute in known.items():
-        if name not in dataset.attrs:
-            if attribute.need == REQUIRED:
-                yield f"attribute {name} is missing"
-        elif not _is(attribute.type, dataset.attrs[name]):
-            yield f"attribute {name} = {str(dataset.attrs[name])[:40]}: allowed is a {attribute.type}"
-
-
 def _is(kind: str, value: Any) -> bool:
     if kind == TEXT:
         return isinstance(value, str)
-    if np.ndim(value) or np.asarray(value).dtype.kind not in ("i" if kind == WHOLE else "if"):
-        return False
-    return bool(np.isfinite(value))
-
-
-def _wrong_variables(dataset: xr.Dataset, known: Mapping[str, Variable], version: tuple[int, ...]) -> Iterator[str]:
-    for name, variable in known.items():
-        if name not in dataset.variables:
-            if variable.need == REQUIRED and version >= _numbers(variable.since):
-                yield f"variable {name} is missing"
-            continue
-        found = dataset[name]
-        for what, theirs, ours in (
-            ("dimensions", " ".join(map(str, found.dims)), " ".join(variable.dimensions)),
-            ("type", found.dtype.str[1:], variable.type),
-            ("units", found.attrs.get("units"), variable.units),
-        ):
-            if ours != theirs:
-                yield f"{name} has {what} {theirs}: allowed is {ours}"
+    kinds = "i" if kind == WHOLE else "if"
+    return np.ndim(value) == 0 and np.asarray(value).dtype.kind in kinds and bool(np.isfinite(value))

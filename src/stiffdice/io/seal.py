@@ -10,7 +10,6 @@ import hashlib
 import os
 import re
 from pathlib import Path
-from typing import BinaryIO
 
 from stiffdice.errors import RefusedError
 
@@ -23,16 +22,14 @@ _AT_ONCE = 1 << 20  # bytes read at a time
 
 def line_of(data: bytes | memoryview) -> bytes:
     """Return the line that seals so much data."""
-    return _line(hashlib.sha256(data).hexdigest(), len(data))
+    return _LINE.format(hashlib.sha256(data).hexdigest(), len(data)).encode("ascii")
 
 
 def seal(path: Path) -> None:
     """Add the line to a finished file; raises OSError if it cannot be written."""
     with path.open("r+b") as file:
-        length = os.fstat(file.fileno()).st_size
-        line = _line(_digest(file, length), length)
-        file.seek(length)
-        file.write(line)
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.write(_LINE.format(digest, file.tell()).encode("ascii"))
 
 
 def digest_in(path: Path) -> str | None:
@@ -59,22 +56,9 @@ def check(path: Path) -> bool:
         if int(told[2]) != length:
             raise RefusedError(f"damaged: {length} bytes long, its seal is for {int(told[2])}")
         file.seek(0)
-        if _digest(file, length).encode("ascii") != told[1]:
+        digest = hashlib.sha256()
+        for left in range(length, 0, -_AT_ONCE):
+            digest.update(file.read(min(_AT_ONCE, left)))
+        if digest.hexdigest().encode("ascii") != told[1]:
             raise RefusedError("damaged: its content is not what was sealed")
         return True
-
-
-def _line(digest: str, length: int) -> bytes:
-    return _LINE.format(digest, length).encode("ascii")
-
-
-def _digest(file: BinaryIO, length: int) -> str:
-    """Return the SHA-256 of the next so many bytes."""
-    digest = hashlib.sha256()
-    while length > 0:
-        part = file.read(min(_AT_ONCE, length))
-        if not part:
-            break
-        digest.update(part)
-        length -= len(part)
-    return digest.hexdigest()

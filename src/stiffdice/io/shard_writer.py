@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5netcdf
@@ -41,7 +40,12 @@ class Spool:
 
     def __enter__(self) -> Spool:
         try:
-            self._lay_out()
+            self._file = h5py.File(self._temporary, "w", track_order=True, rdcc_nbytes=_BUFFER)
+            with h5netcdf.File(self._file, "w") as netcdf:
+                netcdf.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
+                netcdf.attrs.update(self._pattern.attrs)
+                for name, variable in self._pattern.variables.items():
+                    self._create(netcdf, str(name), variable)
         except BaseException as error:  # a signal, too: __exit__ is not called then
             self._temporary.unlink(missing_ok=True)
             if isinstance(error, OSError):
@@ -54,14 +58,6 @@ class Spool:
         self._growing = [self._file["cell"], *growing]
         return self
 
-    def _lay_out(self) -> None:
-        self._file = h5py.File(self._temporary, "w", track_order=True, rdcc_nbytes=_BUFFER)
-        with h5netcdf.File(self._file, "w") as netcdf:
-            netcdf.dimensions = {"cell": None, "member": self._pattern.sizes["member"]}
-            netcdf.attrs.update(self._pattern.attrs)
-            for name, variable in self._pattern.variables.items():
-                self._create(netcdf, str(name), variable)
-
     def _create(self, netcdf: h5netcdf.File, name: str, variable: xr.Variable) -> None:
         members = min(CHUNK_MEMBERS, self._pattern.sizes["member"])
         cells = _CHUNK_RUNS // members if "member" in variable.dims else _CHUNK_RUNS
@@ -69,16 +65,9 @@ class Spool:
         for dimension, size in variable.sizes.items():
             if dimension not in netcdf.dimensions:
                 netcdf.dimensions[str(dimension)] = size
-        stored = netcdf.create_variable(
-            name,
-            tuple(str(dimension) for dimension in variable.dims),
-            variable.dtype,
-            chunks=tuple(sizes.get(str(dimension), size) for dimension, size in variable.sizes.items()),
-            compression="gzip",
-            compression_opts=4,
-            shuffle=True,
-            fletcher32=True,
-        )
+        chunks = tuple(sizes.get(str(dimension), size) for dimension, size in variable.sizes.items())
+        packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
+        stored = netcdf.create_variable(name, variable.dims, variable.dtype, chunks=chunks, **packed)
         stored.attrs.update(variable.attrs)
         labels = [str(label) for label in self._pattern.coords if label not in self._pattern.dims]
         if name in self._pattern.data_vars and labels:
@@ -103,9 +92,7 @@ class Spool:
         except OSError as error:
             raise self._told(error) from None
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             self._file.close()
             if kind is None:
@@ -119,9 +106,7 @@ class Spool:
 
     def _told(self, error: OSError | RuntimeError) -> OutputError:
         """Return in one line what HDF5 says in many."""
-        number = error.errno if isinstance(error, OSError) else None
         said = re.search(r"errno = ([0-9]+)", str(error))
-        if not number and said:
-            number = int(said[1])
+        number = getattr(error, "errno", None) or (int(said[1]) if said else None)
         reason = os.strerror(number) if number else str(error).splitlines()[0]
         return OutputError(f"{self._target}: {reason}; nothing was stored")

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from stiffdice.errors import OutputError
@@ -107,20 +106,15 @@ def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
 
     Raises OutputError if it cannot be stored.
     """
+    # Missing values are NaN here; a _FillValue would say so twice, and coordinates must have none.
+    unfilled = {"_FillValue": None}
+    packed = {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
+    encoding = {
+        str(name): (unfilled if variable.dtype.kind == "f" else {}) | (packed if variable.size > 1 else {})
+        for name, variable in dataset.variables.items()
+    }
     try:
-        image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=_encoding(dataset)))
+        image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=encoding))
     except OSError as error:  # in memory, but what makes it may have to be loaded first
         raise OutputError(f"{path}: {error.strerror or error}; nothing was stored") from None
     write_bytes(image, path, seal.line_of(image))
-
-
-def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, object]]:
-    encoding: dict[str, dict[str, object]] = {}
-    for name, variable in dataset.variables.items():
-        encoding[str(name)] = {}
-        # Missing values are NaN here; a _FillValue would say so twice, and coordinates must have none.
-        if np.issubdtype(variable.dtype, np.floating):
-            encoding[str(name)]["_FillValue"] = None
-        if variable.size > 1:
-            encoding[str(name)] |= {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
-    return encoding

@@ -18,7 +18,6 @@ LONGEST_NUMBER = 1000  # digits
 
 _INT, _FLOAT = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
 
-
 # NUL is in no name of a file, a surrogate in no UTF-8 text; YAML has escapes for both.
 _NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")
 
@@ -33,9 +32,7 @@ class _Loader(yaml.SafeLoader):
         event = self.peek_event()  # type: ignore[no-untyped-call]
         tag = getattr(event, "tag", None)
         if tag is not None:
-            raise InputError(
-                f"line {event.start_mark.line + 1}: not valid YAML: tag {tag}: allowed are values without tags"
-            )
+            raise InputError(f"{_line(event)}: not valid YAML: tag {tag}: allowed are values without tags")
         return super().compose_node(parent, index)
 
     def get_single_node(self) -> yaml.Node | None:
@@ -59,7 +56,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _line(node: yaml.Node) -> str:
+def _line(node: Any) -> str:
     return f"line {node.start_mark.line + 1}"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from stiffdice.errors import InputError
 from stiffdice.scene import flat_landing, units, validation
 from stiffdice.scene.cube import GEOMETRIES, Cube, radius_of
-from stiffdice.scene.ground import CONTACT_LAWS, Ground
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 # By section: a key that may be given, and the key it is given instead of.
 INSTEAD: Mapping[str, Mapping[str, str]] = {
@@ -44,17 +44,18 @@ def cube(keys: Mapping[str, Any]) -> Resolved:
     if "side" not in keys:
         return dict(keys), ()
     geometry = validation.choice("cube.geometry", keys.get("geometry", GEOMETRY), GEOMETRIES)
-    side = validation.number("cube.side", keys["side"], "m", above=0)
-    radius = radius_of(side, geometry)
-    rest = {key: value for key, value in keys.items() if key != "side"}
-    told = f"cube.radius = {radius:.6g} m, from cube.side = {side:g} m by the {geometry} geometry"
-    return rest | {"radius": radius}, (told,)
+    rest = dict(keys)
+    side = validation.number("cube.side", rest.pop("side"), "m", above=0)
+    rest["radius"] = radius_of(side, geometry)
+    told = f"cube.radius = {rest['radius']:.6g} m, from cube.side = {side:g} m by the {geometry} geometry"
+    return rest, (told,)
 
 
-def ground(keys: Mapping[str, Any], cube: Cube) -> Resolved:
+def ground(keys: Mapping[str, Any], cube: Cube, stiffness: float) -> Resolved:
     """Return the keys of a ground with stiffness and damping for its restitution and contact time.
 
-    These are of a flat landing without gravity under the scene's contact law (`flat_landing`). Raises InputError for
+    These are of a flat landing without gravity under the scene's contact law (`flat_landing`). stiffness [kg/s²]: of a
+    ground for which none is given. Raises InputError for
     keys that exclude each other, and for values that no ground has.
     """
     _refuse_both("ground", keys)
@@ -79,7 +80,7 @@ def ground(keys: Mapping[str, Any], cube: Cube) -> Resolved:
                 f"cube.mass = {cube.mass:g} kg (stiffness {rest['stiffness']:g} kg/s²)"
             )
         told = (f"ground.stiffness = {rest['stiffness']:.6g} kg/s², {source}",)
-    stiffness = validation.number("ground.stiffness", rest.get("stiffness", Ground.stiffness), "kg/s²", above=0)
+    stiffness = validation.number("ground.stiffness", rest.get("stiffness", stiffness), "kg/s²", above=0)
     rest["damping"] = flat_landing.damping(law, restitution, stiffness, cube.mass)
     told += (f"ground.damping = {rest['damping']:.6g} kg/s, {source}: a flat landing without gravity, {law}",)
     return rest, told

@@ -21,6 +21,7 @@ import math
 
 # How many times as strong the damping of a flat cube is on the way in as on the way out, by contact law.
 APPROACH_DAMPING = {"ungated": 2.0, "gated": 1.0}
+CONTACT_LAWS = tuple(APPROACH_DAMPING)
 
 
 def leg(zeta: float) -> float:

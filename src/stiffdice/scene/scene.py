@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,32 +18,54 @@ from stiffdice.errors import InputError
 from stiffdice.io import yaml_loader
 from stiffdice.scene import derived_parameters, validation
 from stiffdice.scene.cube import Cube
-from stiffdice.scene.ground import Ground
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 NODE_VELOCITIES = ("translation", "rigid")
 
 # Three readings of the paper. `corrected` leaves the inertia to the scene, which has to state it: the paper
 # places its masses at the corners (m s²/2) and prints the inertia of a solid cube (m s²/6).
-PRESETS: Mapping[str, Mapping[str, str | None]] = {
-    "as_listed": {
-        "ground.contact": "ungated",
-        "cube.geometry": "printed",
-        "cube.inertia": "solid",
-        "launch.node_velocity": "translation",
-    },
-    "as_written": {
-        "ground.contact": "gated",
-        "cube.geometry": "printed",
-        "cube.inertia": "solid",
-        "launch.node_velocity": "rigid",
-    },
-    "corrected": {
-        "ground.contact": "gated",
-        "cube.geometry": "exact",
-        "cube.inertia": None,
-        "launch.node_velocity": "rigid",
-    },
+_PRESET_KEYS = ("ground.contact", "cube.geometry", "cube.inertia", "launch.node_velocity")
+_PRESET_VALUES = {
+    "as_listed": ("ungated", "printed", "solid", "translation"),
+    "as_written": ("gated", "printed", "solid", "rigid"),
+    "corrected": ("gated", "exact", None, "rigid"),
 }
+PRESETS: Mapping[str, Mapping[str, str | None]] = {
+    name: dict(zip(_PRESET_KEYS, values, strict=True)) for name, values in _PRESET_VALUES.items()
+}
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground of section 2.2: an elastic plane through the origin that pushes back; constants are per node.
+
+    stiffness S [kg/s²], damping D [kg/s], friction coefficient mu [1], contact: the contact law.
+    normal: the direction out of the ground; any length but zero, stored with length one.
+    Raises InputError for values out of range.
+    """
+
+    stiffness: float = 1.0e4
+    damping: float = 0.2
+    friction: float = 0.075
+    contact: str = "ungated"
+    normal: validation.Vector = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        for key, unit in (("stiffness", "kg/s²"), ("damping", "kg/s"), ("friction", "1")):
+            value = validation.number(f"ground.{key}", getattr(self, key), unit, at_least=0)
+            object.__setattr__(self, key, value)
+        validation.choice("ground.contact", self.contact, CONTACT_LAWS)
+        normal = validation.vector("ground.normal", self.normal, "1")
+        largest = max(abs(part) for part in normal)
+        if largest == 0:
+            raise InputError("ground.normal = [0, 0, 0]: allowed is any direction but zero (normalised to length 1)")
+        # Scaling by a power of two keeps the squares in range and changes no digit.
+        exponent = math.frexp(largest)[1]
+        x, y, z = (math.ldexp(part, -exponent) for part in normal)
+        length = math.sqrt(x * x + y * y + z * z)
+        if abs(math.ldexp(length, exponent) - 1) >= 4e-16:  # else as it is, so that storing is idempotent
+            normal = x / length + 0.0, y / length + 0.0, z / length + 0.0  # as validation.number: no -0
+        object.__setattr__(self, "normal", normal)
 
 
 @dataclass(frozen=True)
@@ -170,15 +193,24 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
     chosen = preset if preset is not None else top.get("preset")
     if "side" in sections["cube"]:
         sections["cube"].setdefault("geometry", derived_parameters.GEOMETRY)
-    if chosen is not None:
-        _apply_preset(validation.choice("preset", chosen, PRESETS), sections)
+    for path, value in PRESETS[validation.choice("preset", chosen, PRESETS)].items() if chosen is not None else ():
+        section, key = path.split(".")
+        if value is not None:
+            sections[section].setdefault(key, value)
+        elif key not in sections[section]:
+            raise InputError(
+                f"preset = {chosen}: state {path}, too: solid (m s²/6, the paper's formula) or corners "
+                "(m s²/2, the paper's eight corner masses)"
+            )
     keys, derived = derived_parameters.cube(sections["cube"])
     cube = Cube(**keys)
-    keys, of_ground = derived_parameters.ground(sections["ground"], cube)
+    keys, of_ground = derived_parameters.ground(sections["ground"], cube, Ground.stiffness)
     launch = derived_parameters.launch(sections["launch"], cube)
-    spin = launch.get("angular_momentum")
+    where, spin = "launch.angular_momentum", launch.get("angular_momentum")
     if isinstance(spin, Mapping):
-        launch["angular_momentum"] = _random_spin(spin)
+        if "seed" not in validation.known_keys(where, spin, ["seed", "low", "high"]):
+            raise InputError(f"{where}.seed is missing: allowed is a whole number >= 0")
+        launch["angular_momentum"] = RandomSpin(**spin)
     rest = {key: top[key] for key in ("gravity", "duration") if key in top}
     return Scene(cube, Ground(**keys), Launch(**launch), **rest, derived=derived + of_ground)
 
@@ -190,26 +222,6 @@ _ONE_UNIT = re.compile(r"\s*\[[^][{}]*\]\s*[^\s\]#][^\]#]*")
 def _given(mapping: object) -> object:
     """Return a section as given; one with nothing in it has no keys."""
     return {} if mapping is None else mapping
-
-
-def _apply_preset(preset: str, sections: dict[str, dict[str, Any]]) -> None:
-    for path, value in PRESETS[preset].items():
-        section, key = path.split(".")
-        if value is not None:
-            sections[section].setdefault(key, value)
-        elif key not in sections[section]:
-            raise InputError(
-                f"preset = {preset}: state {path}, too: solid (m s²/6, the paper's formula) or corners "
-                "(m s²/2, the paper's eight corner masses)"
-            )
-
-
-def _random_spin(mapping: Mapping[str, Any]) -> RandomSpin:
-    where = "launch.angular_momentum"
-    keys = validation.known_keys(where, mapping, ["seed", "low", "high"])
-    if "seed" not in keys:
-        raise InputError(f"{where}.seed is missing: allowed is a whole number >= 0")
-    return RandomSpin(**keys)
 
 
 def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = None) -> Scene:

@@ -29,8 +29,12 @@ _SYMBOLS = {
     "rad": Unit(0, 1.0, (0, 0, 0, 1)),
 }
 _PREFIXES = {"n": -9, "µ": -6, "μ": -6, "u": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}
-# Without.
-_OTHERS = {
+# Those, and units that have no prefix.
+_UNITS = {
+    prefix + symbol: unit._replace(power=unit.power + power)
+    for prefix, power in {**_PREFIXES, "": 0}.items()
+    for symbol, unit in _SYMBOLS.items()
+} | {
     "min": Unit(0, 60.0, (0, 0, 1, 0)),
     "h": Unit(0, 3600.0, (0, 0, 1, 0)),
     "deg": Unit(0, math.pi / 180, (0, 0, 0, 1)),
@@ -65,7 +69,7 @@ def unit_of(text: str) -> Unit | None:
     raised = text.translate(_RAISED)
     while at < len(raised):
         found = _FACTOR.match(raised, at)
-        symbol = _symbol(found[2]) if found else None
+        symbol = _UNITS.get(found[2]) if found else None
         if found is None or symbol is None or (at == 0 and found[1]):
             return None
         exponent = int(found[3] or 1) * (-1 if found[1] == "/" else 1)
@@ -74,14 +78,6 @@ def unit_of(text: str) -> Unit | None:
         a, b, c, d = (x + exponent * y for x, y in zip(dimensions, symbol.dimensions, strict=True))
         dimensions, at = (a, b, c, d), found.end()
     return Unit(power, factor, dimensions) if raised.strip() else None
-
-
-def _symbol(text: str) -> Unit | None:
-    known = _OTHERS.get(text) or _SYMBOLS.get(text)
-    if known is None and text[1:] in _SYMBOLS and text[0] in _PREFIXES:
-        base = _SYMBOLS[text[1:]]
-        return base._replace(power=base.power + _PREFIXES[text[0]])
-    return known
 
 
 def in_si(text: str, unit: str) -> float:

@@ -31,10 +31,9 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
     unit: the SI unit, `1` or empty for a number without. Raises InputError for anything else: booleans, other text, NaN
     and infinities included.
     """
-    result, told, allowed = math.nan, shown(value), "allowed is a finite number"
-    allowed += "" if above is None else f" > {above:g}"
-    allowed += "" if at_least is None else f" >= {at_least:g}"
-    allowed += f" [{unit}]" if unit else ""
+    result, told = math.nan, shown(value)
+    bounds = "".join(f" {sign} {bound:g}" for sign, bound in ((">", above), (">=", at_least)) if bound is not None)
+    allowed = f"allowed is a finite number{bounds}" + (f" [{unit}]" if unit else "")
     if isinstance(value, str):
         allowed += f", or with a unit, as {units.EXAMPLES[unit]}" if unit in units.EXAMPLES else ""
         try:
@@ -44,8 +43,8 @@ def number(key: str, value: object, unit: str, *, above: float | None = None, at
     elif isinstance(value, numbers.Real) and not isinstance(value, bool):
         with contextlib.suppress(OverflowError):
             result = float(value)
-    above, at_least = -math.inf if above is None else above, -math.inf if at_least is None else at_least
-    if not (math.isfinite(result) and result > above and result >= at_least):
+    too_small = (above is not None and result <= above) or (at_least is not None and result < at_least)
+    if too_small or not math.isfinite(result):
         raise InputError(f"{key} = {told}: {allowed}")
     return result + 0.0  # -0 is 0: equal scenes have equal digests
 

@@ -83,19 +83,19 @@ EXPERIMENTS: dict[str, Entry] = {
     "failure-map": Entry("stiffdice.experiments.failure_map", "measure"),
     "friction-chatter": Entry("stiffdice.experiments.friction_chatter", "measure"),
     "precision-limits": Entry("stiffdice.experiments.precision_limits", "measure"),
-    "model-ablation": Entry("stiffdice.experiments.model_ablation.measure", "measure"),
+    "model-ablation": Entry("stiffdice.experiments.model_ablation", "measure"),
     "held-contacts": Entry("stiffdice.experiments.held_contacts", "measure"),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
-    "engine-contact": Entry("stiffdice.experiments.engines.contact", "measure"),
-    "engine-limits": Entry("stiffdice.experiments.engines.limits", "measure"),
-    "engine-throw": Entry("stiffdice.experiments.engines.throw", "measure"),
+    "engine-contact": Entry("stiffdice.experiments.engines", "contact"),
+    "engine-limits": Entry("stiffdice.experiments.engines", "limits"),
+    "engine-throw": Entry("stiffdice.experiments.engines", "throw"),
 }
 
 # (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.
 TIMINGS: dict[str, Entry] = {
-    "work-precision": Entry("stiffdice.experiments.work_precision.time", "time"),
-    "model-ablation": Entry("stiffdice.experiments.model_ablation.time", "time"),
-    "engine-speed": Entry("stiffdice.experiments.engines.speed", "time"),
+    "work-precision": Entry("stiffdice.experiments.work_precision.measure", "time"),
+    "model-ablation": Entry("stiffdice.experiments.model_ablation", "time"),
+    "engine-speed": Entry("stiffdice.experiments.engines", "speed"),
 }
 
 

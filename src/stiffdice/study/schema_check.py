@@ -11,7 +11,7 @@ from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import yaml_loader
 from stiffdice.scene import validation
-from stiffdice.scene.ground import CONTACT_LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import backend
 from stiffdice.simulation.engines import registry as engines
 

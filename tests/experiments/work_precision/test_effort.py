@@ -8,7 +8,7 @@ import pytest
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
-from stiffdice.experiments.work_precision.effort import (
+from stiffdice.experiments.work_precision.measure import (
     ALL,
     COARSE,
     FINE,

@@ -7,7 +7,6 @@ import xarray as xr
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
 from stiffdice.experiments.work_precision import measure as work_precision
-from stiffdice.experiments.work_precision import time as work_precision_time
 from stiffdice.experiments.work_precision.problems import MEASURES, SAMPLES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.writer import write_dataset
@@ -44,7 +43,7 @@ def throw():
 
 @pytest.fixture(scope="module")
 def timed():
-    return work_precision_time.time(SCENE, **FAST)
+    return work_precision.time(SCENE, **FAST)
 
 
 def rungs(found, method, stiffness):
@@ -176,7 +175,7 @@ def test_timings_of_nothing_are_told(timed):
         ({"per_decade": 0}, "per_decade = 0"),
     ],
 )
-@pytest.mark.parametrize("function", [work_precision.measure, work_precision_time.time])
+@pytest.mark.parametrize("function", [work_precision.measure, work_precision.time])
 def test_what_cannot_be_measured_is_said(function, options, told):
     with pytest.raises(InputError, match=told):
         function(SCENE, **options)

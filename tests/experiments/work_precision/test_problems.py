@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
-from stiffdice.experiments.work_precision.effort import Effort, lag_time, path_of
+from stiffdice.experiments.work_precision.measure import Effort, lag_time, path_of
 from stiffdice.experiments.work_precision.problems import MEASURES, PROBLEMS, SAMPLES, Judge, scene_of, touchdown
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines import stepper

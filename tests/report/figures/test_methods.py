@@ -5,11 +5,9 @@ import pytest
 import xarray as xr
 from tests.report.figures.drawing import check_equal_files, drawn
 
-from stiffdice.experiments.engines import limits as engine_limits
-from stiffdice.experiments.engines import speed as engine_speed
+from stiffdice.experiments import engines
 from stiffdice.experiments.work_precision import measure as work_precision
-from stiffdice.experiments.work_precision import time as work_precision_time
-from stiffdice.experiments.work_precision.effort import STEPPING
+from stiffdice.experiments.work_precision.measure import STEPPING
 from stiffdice.integrators.registry import SCHEMES
 from stiffdice.io.cf_enums import enum_attributes, meanings_of
 from stiffdice.report.figures import methods, style
@@ -36,7 +34,7 @@ def data():
 def timings():
     options = {"methods": METHODS, "stiffness": [1e2, 1e4, 1e6], "per_decade": 1, "affordable": 1e-3, "rounds": 1}
     problems = {"flat timed": "flat-bounce", "rubbing timed": "sliding-bounce"}
-    return {name: work_precision_time.time(SCENE, problem=problem, **options) for name, problem in problems.items()}
+    return {name: work_precision.time(SCENE, problem=problem, **options) for name, problem in problems.items()}
 
 
 def lines_of(panel):
@@ -121,12 +119,12 @@ BESIDE = ["symplectic_euler", "scipy", "numpy"]
 
 @pytest.fixture(scope="module")
 def limits():
-    return engine_limits.measure(STIFF, methods=BESIDE, omega_h=[0.1, 12.0], count=4, phases=2)
+    return engines.limits(STIFF, methods=BESIDE, omega_h=[0.1, 12.0], count=4, phases=2)
 
 
 @pytest.fixture(scope="module")
 def speed():
-    return engine_speed.time(STIFF, methods=BESIDE, steps=120, rounds=1)
+    return engines.speed(STIFF, methods=BESIDE, steps=120, rounds=1)
 
 
 @pytest.fixture(scope="module")

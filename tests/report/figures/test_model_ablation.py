@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from tests.report.figures.drawing import drawn
 
-from stiffdice.experiments.model_ablation.measure import measure
-from stiffdice.experiments.model_ablation.time import time
+from stiffdice.experiments.model_ablation import measure, time
 from stiffdice.scene.scene import Scene
 
 pytestmark = pytest.mark.long

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from stiffdice.experiments.measuring import coordinates
-from stiffdice.experiments.work_precision.effort import GRID
+from stiffdice.experiments.work_precision.measure import GRID
 from stiffdice.report.tables.methods import cost_of, engines_note, found_in, targets, work_precision
 
 COSTS = np.array([1e2, 1e3, 1e4, 1e5, 1e6])

@@ -5,7 +5,7 @@ import pytest
 
 from stiffdice.dynamics.state import STATE, start_of
 from stiffdice.errors import InputError
-from stiffdice.experiments.engines.single_bounce import flat
+from stiffdice.experiments.engines import flat
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene.scene import Scene, from_mapping
 from stiffdice.simulation.engines import stepper

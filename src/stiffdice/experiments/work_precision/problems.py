@@ -13,7 +13,7 @@ import numpy as np
 from stiffdice.dynamics import flat_bounce
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.rotation import rotated
-from stiffdice.dynamics.state import Array, States, physics_of, start_of
+from stiffdice.dynamics.state import States, physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected
 from stiffdice.experiments.placement import level, relaunched, upright
@@ -89,15 +89,15 @@ def touchdown(scene: Scene) -> float:
 
 
 class Judge:
-    """How far off paths of one problem's scene are."""
+    """How far off paths of one problem's scene are; height [m]: of the centre at the first touch."""
 
     def __init__(self, problem: Problem, scene: Scene, reference: States) -> None:
         """Take the scene (of `scene_of`) and the states that are right; raises InputError if it stays on the ground."""
         self._scene, self._problem, self._reference = scene, problem, reference
-        self._height = touchdown(scene)
+        self.height = touchdown(scene)
         self._after = _next_flight(scene, reference)
-        self._launch_energy = float(_energy(scene, start_of(scene, problem.model))[0])
-        self._end_energy = float(_energy(scene, reference[-1:])[0])
+        self._launch_energy = _energy(scene, start_of(scene, problem.model))
+        self._end_energy = _energy(scene, reference[-1:])
         down, up = self._speeds(reference, 0.0)
         self._restitution = up / down
 
@@ -106,27 +106,22 @@ class Judge:
 
         lag_time [s]: by how much the velocity is behind the place, as the scheme's LAG says.
         """
+        found = dict.fromkeys(MEASURES, math.nan)
         with np.errstate(all="ignore"):
             away = states["position"] - self._reference["position"]
-            found = {
-                "position": math.sqrt(float(np.mean((away**2).sum(axis=1)))) / self._scene.cube.radius,
-                "restitution": self._restitution_error(states, lag_time),
-                "energy": abs(float(_energy(self._scene, states[-1:])[0]) - self._end_energy) / self._launch_energy,
-            }
+            found["position"] = math.sqrt(float(np.mean((away**2).sum(axis=1)))) / self._scene.cube.radius
+            down, up = self._speeds(states, lag_time)
+            if 0 < down < math.inf:
+                exact = self._restitution if self._problem.turns else flat_bounce.restitution(self._scene, down)
+                found["restitution"] = abs(up / down - exact)
+            found["energy"] = abs(_energy(self._scene, states[-1:]) - self._end_energy) / self._launch_energy
         return {name: value if math.isfinite(value) else math.nan for name, value in found.items()}
-
-    def _restitution_error(self, states: States, lag_time: float) -> float:
-        down, up = self._speeds(states, lag_time)
-        if not 0 < down < math.inf:
-            return math.nan
-        exact = self._restitution if self._problem.turns else flat_bounce.restitution(self._scene, down)
-        return abs(up / down - exact)
 
     def _speeds(self, states: States, lag_time: float) -> tuple[float, float]:
         """Return the centre's speed down and up [m/s] at the height of the first touch, on the flights' parabolas."""
         known = states[[0, self._after]]
         slopes = known["velocity"][:, 2] - lag_time * self._scene.gravity
-        squares = slopes**2 + 2 * self._scene.gravity * (known["position"][:, 2] - self._height)
+        squares = slopes**2 + 2 * self._scene.gravity * (known["position"][:, 2] - self.height)
         down, up = np.sqrt(np.maximum(squares, 0.0)).tolist()
         return down, up
 
@@ -144,6 +139,6 @@ def _next_flight(scene: Scene, states: States) -> int:
     return landed + int(later[0])
 
 
-def _energy(scene: Scene, states: States) -> Array:
-    """Return kinetic, potential and elastic energy [J], shape (state,)."""
-    return np.asarray(sum(energies(physics_of(scene), states)))
+def _energy(scene: Scene, states: States) -> float:
+    """Return kinetic, potential and elastic energy [J] of one state."""
+    return float(sum(energies(physics_of(scene), states))[0])

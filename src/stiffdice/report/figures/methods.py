@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import Array
-from stiffdice.experiments.engines.single_bounce import OUTCOMES
+from stiffdice.experiments.engines import OUTCOMES
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style

@@ -13,9 +13,8 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
-from stiffdice.experiments.engines.contact import RATIOS
-from stiffdice.experiments.engines.single_bounce import OUTCOMES
-from stiffdice.experiments.work_precision.effort import fixed_step
+from stiffdice.experiments.engines import OUTCOMES, RATIOS
+from stiffdice.experiments.work_precision.measure import fixed_step
 from stiffdice.experiments.work_precision.problems import PROBLEMS
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered

@@ -6,7 +6,7 @@ import pytest
 
 from stiffdice.dynamics import flat_bounce, linear_theory
 from stiffdice.errors import InputError
-from stiffdice.experiments.engines.single_bounce import bounce, flat
+from stiffdice.experiments.engines import bounce, flat
 from stiffdice.experiments.placement import landing_speed
 from stiffdice.scene.scene import Scene
 

@@ -8,11 +8,8 @@ import pytest
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
-from stiffdice.experiments.engines import contact as engine_contact
-from stiffdice.experiments.engines import limits as engine_limits
-from stiffdice.experiments.engines import speed as engine_speed
-from stiffdice.experiments.engines import throw as engine_throw
-from stiffdice.experiments.engines.single_bounce import OUTCOMES
+from stiffdice.experiments import engines as experiments
+from stiffdice.experiments.engines import OUTCOMES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.writer import write_dataset
 from stiffdice.report.tables import methods as tables
@@ -22,28 +19,28 @@ SCENE = from_mapping(
     {"ground": {"damping": 0.1, "friction": 0.1}, "launch": {"angular_momentum": [0.3, 0.5, 0.2]}}, "as_written"
 )
 UNDAMPED = SCENE.with_ground(stiffness=1e6, damping=0.0)
-METHODS = list(engine_limits.METHODS)
+METHODS = list(experiments.METHODS)
 
 
 @pytest.fixture(scope="module")
 def limits():
-    return engine_limits.measure(UNDAMPED, omega_h=[0.02, 12.0], count=10, phases=4)
+    return experiments.limits(UNDAMPED, omega_h=[0.02, 12.0], count=10, phases=4)
 
 
 @pytest.fixture(scope="module")
 def contact():
-    return engine_contact.measure(SCENE, stiffness=[1e6], damping=[0.0, 10.0], phases=2)
+    return experiments.contact(SCENE, stiffness=[1e6], damping=[0.0, 10.0], phases=2)
 
 
 @pytest.fixture(scope="module")
 def throw():
     scene = from_mapping(SCENE.as_mapping() | {"duration": 2.0})
-    return engine_throw.measure(scene, methods=["symplectic_euler", "numpy"], steps=4e5, samples=20)
+    return experiments.throw(scene, methods=["symplectic_euler", "numpy"], steps=4e5, samples=20)
 
 
 @pytest.fixture(scope="module")
 def speed():
-    return engine_speed.time(SCENE, methods=["symplectic_euler", "scipy", "numpy"], steps=600, rounds=1)
+    return experiments.speed(SCENE, methods=["symplectic_euler", "scipy", "numpy"], steps=600, rounds=1)
 
 
 def of(found, method):
@@ -80,7 +77,7 @@ def test_a_cube_at_rest_is_shaken_off_beyond_the_limit_of_stability(limits):
 
 def test_our_own_contact_is_exact_but_for_the_step(contact):
     found = of(contact, "symplectic_euler")
-    for name in engine_contact.RATIOS:
+    for name in experiments.RATIOS:
         np.testing.assert_allclose(found[name].isel(omega_h=1), 1, atol=2e-4, err_msg=name)
     for name in ("rest_depth", "rough_restitution"):
         np.testing.assert_allclose(of(contact, "scipy")[name], 1, atol=1e-6, err_msg=name)
@@ -93,13 +90,13 @@ def test_what_implicit_euler_loses_falls_with_the_step(contact):
 
 def test_a_cube_that_friction_stops_in_the_bounce_is_refused():
     with pytest.raises(InputError, match="4 mu"):
-        engine_contact.measure(SCENE.with_ground(friction=0.2), methods=["symplectic_euler"], phases=1)
+        experiments.contact(SCENE.with_ground(friction=0.2), methods=["symplectic_euler"], phases=1)
 
 
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "drake"])
 def test_the_contact_of_an_engine_is_the_laws_but_for_the_step(engine):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
-    found = engine_contact.measure(SCENE, methods=[engine], stiffness=[1e6], damping=[0.0], omega_h=[0.02], phases=1)
+    found = experiments.contact(SCENE, methods=[engine], stiffness=[1e6], damping=[0.0], omega_h=[0.02], phases=1)
     found = found.squeeze()
     assert float(found.rest_depth) == pytest.approx(1, abs=1e-6)
     assert float(found.friction) == pytest.approx(1, abs=1e-6)

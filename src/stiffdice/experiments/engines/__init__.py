@@ -1,1 +1,0 @@
-"""The same contact, throw and limits in every engine."""
