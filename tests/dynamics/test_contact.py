@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS, normal_force, normal_slopes
+from stiffdice.dynamics.contact import normal_force, normal_slopes
+from stiffdice.dynamics.state import physics_of
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 
@@ -100,29 +102,32 @@ def test_a_throw_against_a_second_implementation(contact, normal):
 
 
 @njit
-def _normal(law, depth, speed, stiffness, damping):
-    force = normal_force(law, depth, speed, stiffness, damping)
-    return force, normal_slopes(law, depth, speed, stiffness, damping)
+def _normal(physics, depth, speed):
+    return normal_force(physics, depth, speed), normal_slopes(physics, depth, speed)
 
 
-@pytest.mark.parametrize("contact", LAWS)
+def _ground(contact):
+    return physics_of(from_mapping({"ground": {"contact": contact, "stiffness": 100.0, "damping": 1.5}}))
+
+
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.parametrize("depth", [-0.3, -1e-3, 2e-3, 0.5])
 @pytest.mark.parametrize("speed", [-2.0, -0.1, 0.03, 3.0, 80.0])
 def test_slopes_are_those_of_the_force(contact, depth, speed):
     """Against differences, at points to either side of every kink of the law, pushing and not."""
-    law, stiffness, damping, off = LAWS[contact], 100.0, 1.5, 1e-7
-    _, (by_depth, by_speed) = _normal(law, depth, speed, stiffness, damping)
-    deeper, shallower = (_normal(law, depth + s, speed, stiffness, damping)[0] for s in (off, -off))
-    faster, slower = (_normal(law, depth, speed + s, stiffness, damping)[0] for s in (off, -off))
+    physics, off = _ground(contact), 1e-7
+    _, (by_depth, by_speed) = _normal(physics, depth, speed)
+    deeper, shallower = (_normal(physics, depth + s, speed)[0] for s in (off, -off))
+    faster, slower = (_normal(physics, depth, speed + s)[0] for s in (off, -off))
     assert by_depth == pytest.approx((deeper - shallower) / (2 * off), rel=1e-6)
     assert by_speed == pytest.approx((faster - slower) / (2 * off), rel=1e-6)
-    assert by_depth in (0, stiffness)
-    assert by_speed in (0, -damping)
+    assert by_depth in (0, 100.0)
+    assert by_speed in (0, -1.5)
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_a_ground_that_does_not_push_has_no_slope(contact):
     """At the kinks themselves, too: on the ground at rest, and where damping pulls as much as the spring pushes."""
     for depth, speed in ((0.0, 0.0), (0.0, 1.0), (0.03, 2.0)):
-        force, slopes = _normal(LAWS[contact], depth, speed, 100.0, 1.5)
+        force, slopes = _normal(_ground(contact), depth, speed)
         assert (force, slopes) == (0, (0, 0))

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.model_selection import least_model
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import physics_of, start_of
@@ -93,10 +92,10 @@ def test_each_scene_needs_all_but_its_piece(contact):
 @pytest.mark.long
 def test_a_tensor_that_turns_with_a_cube_changes_nothing():
     scene = from_mapping({"launch": {"angular_momentum": [0.3, 0.5, -0.2]}, "duration": 1.8})
-    law, model, steps = LAWS["ungated"], MODELS["tumbling"], 3000
+    model, steps = MODELS["tumbling"], 3000
     plain = stepper.ready("symplectic_euler", scene, "tumbling", steps, 1)()().states[1:]
     turning, tensor = start_of(scene, "tumbling"), scene.cube.moment_of_inertia * np.eye(3)
-    take_with_tensor(model, law, physics_of(scene), turning, tensor, scene.duration / steps, steps)
+    take_with_tensor(model, physics_of(scene), turning, tensor, scene.duration / steps, steps)
     for part in ("position", "velocity", "angular_momentum", "angular_velocity", "node_offset"):
         np.testing.assert_allclose(turning[part], plain[part], rtol=0, atol=1e-9, err_msg=part)
     assert np.abs(plain["node_offset"] - start_of(scene, "tumbling")["node_offset"]).max() > 0.5
@@ -111,7 +110,7 @@ def test_a_tensor_that_is_not_isotropic_turns_with_its_body():
     tensor[:] = np.diag([0.1, 0.2, 0.3])
     state["angular_momentum"] = spin = np.array([0.3, 0.1, 0.2])
     before = spin @ np.linalg.solve(tensor, spin) / 2
-    take_with_tensor(MODELS["tumbling"], LAWS["gated"], physics_of(scene), state, tensor, 1e-4, 20_000)
+    take_with_tensor(MODELS["tumbling"], physics_of(scene), state, tensor, 1e-4, 20_000)
     np.testing.assert_allclose(np.linalg.eigvalsh(tensor), [0.1, 0.2, 0.3], rtol=1e-9)
     assert np.abs(tensor - np.diag([0.1, 0.2, 0.3])).max() > 0.02
     assert spin @ np.linalg.solve(tensor, spin) / 2 == pytest.approx(before, rel=1e-3)

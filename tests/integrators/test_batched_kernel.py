@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Ensemble, physics_of
 from stiffdice.integrators.registry import SCHEMES
@@ -26,7 +25,7 @@ def listed(scene, model, launches, steps, samples=1):
     """Members stepped one by one in the listing's order: states, shape (member, samples + 1)."""
     states = np.empty((len(launches), samples + 1), STATE)
     states[:, 0] = launches
-    tags = SCHEMES["symplectic_euler"], MODELS[model], LAWS[scene.ground.contact]
+    tags = SCHEMES["symplectic_euler"], MODELS[model]
     for member in states:
         fixed_step.advance(*tags, physics_of(scene), member, steps // samples, scene.duration / steps, 1e-9)
     return states

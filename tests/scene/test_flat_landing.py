@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.integrators.exact.oscillator import Oscillator, after
 from stiffdice.scene import flat_landing
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 
-laws = st.sampled_from(sorted(LAWS))
+laws = st.sampled_from(sorted(CONTACT_LAWS))
 
 
 def schwager_poeschel(zeta):
@@ -51,8 +51,8 @@ def test_the_damping_ratio_of_a_restitution_has_it(law, restitution):
 
 
 def test_a_ground_that_keeps_all_the_speed_has_no_damping():
-    assert all(flat_landing.damping_ratio(law, 1.0) == 0 for law in LAWS)
-    assert all(flat_landing.duration(law, 0.0) == math.pi for law in LAWS)
+    assert all(flat_landing.damping_ratio(law, 1.0) == 0 for law in CONTACT_LAWS)
+    assert all(flat_landing.duration(law, 0.0) == math.pi for law in CONTACT_LAWS)
 
 
 @given(laws, st.floats(0.01, 1), st.floats(1e-6, 1), st.floats(1e-3, 1e3))
@@ -61,7 +61,7 @@ def test_a_ground_of_a_contact_time_pushes_for_so_long(law, restitution, contact
     stiffness = flat_landing.stiffness(law, restitution, contact_time, mass)
     damping = flat_landing.damping(law, restitution, stiffness, mass)
     omega, beta = 2 * math.sqrt(stiffness / mass), 2 * damping / mass
-    approach = flat_landing.APPROACH_DAMPING[law] * beta
+    approach = CONTACT_LAWS[law].approach_damping * beta
     turn = flat_landing.leg(approach / omega) / omega
     depth, speed = after(Oscillator(omega, approach, 0.0, -1.0), turn)
     assert speed == pytest.approx(0, abs=1e-12)
@@ -83,7 +83,7 @@ def measured(scene, scheme):
     return np.sqrt(speed[up] ** 2 + 2 * scene.gravity * low[up]) / -speed[0]
 
 
-@pytest.mark.parametrize("law", sorted(LAWS))
+@pytest.mark.parametrize("law", sorted(CONTACT_LAWS))
 @pytest.mark.parametrize("restitution", [0.05, 0.2, 0.5, 0.8, 0.95, 0.99, 1.0])
 @pytest.mark.parametrize("ground", [{"contact_time": 1e-7}, {"stiffness": 1e14}], ids=["contact_time", "stiffness"])
 def test_a_run_has_the_restitution_that_was_asked_for(law, restitution, ground):

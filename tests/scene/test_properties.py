@@ -34,7 +34,7 @@ VALUES = {
     "ground.stiffness": positive,
     "ground.damping": positive,
     "ground.friction": positive,
-    "ground.contact": st.sampled_from(CONTACT_LAWS),
+    "ground.contact": st.sampled_from(sorted(CONTACT_LAWS)),
     "ground.normal": normals,
     "launch.position": vectors,
     "launch.velocity": vectors,
@@ -132,7 +132,7 @@ def test_nothing_is_negative_zero():
     assert from_mapping(minus).digest == from_mapping(plus).digest
 
 
-@given(mappings, positive, st.sampled_from(CONTACT_LAWS))
+@given(mappings, positive, st.sampled_from(sorted(CONTACT_LAWS)))
 def test_another_ground_is_all_that_changes(mapping, stiffness, contact):
     scene = from_mapping(mapping)
     other = scene.with_ground(stiffness=stiffness, contact=contact)

@@ -12,13 +12,13 @@ import pytest
 import xarray as xr
 
 from stiffdice.dynamics import code_digest, energy
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import TOUCHING, physics_of
 from stiffdice.errors import InputError
 from stiffdice.integrators.registry import LAGS
 from stiffdice.io.reader import open_file
 from stiffdice.io.writer import write_dataset
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping, load
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.dataset import run_dataset
@@ -37,7 +37,9 @@ OTHERS = [
     for scheme in BOOKED
     if scheme not in (EULER, "exact")
 ]
-for_all = pytest.mark.parametrize(("scheme", "model", "contact"), [*itertools.product([EULER], LANDING, LAWS), *OTHERS])
+for_all = pytest.mark.parametrize(
+    ("scheme", "model", "contact"), [*itertools.product([EULER], LANDING, CONTACT_LAWS), *OTHERS]
+)
 
 
 def rough(contact, model="tumbling", **ground):
@@ -115,7 +117,7 @@ def test_a_schemes_lag_is_the_one_that_keeps_energy_in_free_flight(scheme, model
 
 
 @pytest.mark.parametrize("model", LANDING)
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.parametrize("steps", [300, 3_000, 100_000])
 def test_symplectic_eulers_defect_is_all_in_the_springs(model, contact, steps):
     """The works of all forces are the change of the kinetic energy, in each bounce: none is missing or wrong."""

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stiffdice.dynamics import flat_bounce, linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.errors import InputError
 from stiffdice.integrators.registry import SCHEMES
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import PRESETS
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.criteria.registry import CRITERIA
@@ -494,7 +494,7 @@ def test_auto_is_resolved_for_each_reading_of_a_run(changed):
         ("model", "sticky", "model = sticky", [*MODELS, "auto"]),
         ("scheme", [1], "scheme = [1]", SCHEMES),
         ("simulator", 3, "simulator = 3", [OURS, *ENGINES]),
-        ("contact", ["gated", "sticky"], "contact.1 = sticky", LAWS),
+        ("contact", ["gated", "sticky"], "contact.1 = sticky", CONTACT_LAWS),
     ],
 )
 def test_a_study_may_name_what_the_code_knows(changed, key, wrong, named, allowed):
@@ -508,7 +508,7 @@ def test_the_schema_names_nothing_that_a_registry_names(study_schema):
     text = study_schema.read_text()
     assert yaml.safe_load(text)["$defs"]["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
     looked_up = (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, catalogue.TIMINGS, CRITERIA)
-    for registry in (*looked_up, MODELS, SCHEMES, ENGINES, LAWS):
+    for registry in (*looked_up, MODELS, SCHEMES, ENGINES, CONTACT_LAWS):
         assert not [name for name in registry if re.search(rf"[ \[]{name}[,\]]", text)]
 
 

@@ -9,10 +9,10 @@ import sys
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.integrators.registry import SCHEMES
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.criteria.registry import tolerances_of
 from stiffdice.simulation.engines.registry import ENGINES
@@ -131,7 +131,7 @@ def test_references_are_shared_by_the_cells_of_a_piece():
     assert 32 * cost_model.REFERENCE * 0.99 < alone - among < 0.5
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_scheme_and_engine_has_a_cost(model, contact):
     ours = [{"scheme": scheme} for scheme in (*SCHEMES, "unknown")]
@@ -166,7 +166,7 @@ EXTREMES = [
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("stiffness", [5e-324, 1e4, 1e300])
 def test_no_scene_is_without_a_cost(extreme, model, stiffness):
-    for contact in LAWS:
+    for contact in CONTACT_LAWS:
         for asked in ({}, {"criteria": ALL}, {"simulator": "scipy", "scheme": "own"}):
             plan = sweep_of(model, contact, stiffness, scene=extreme, members=65, **asked)
             seconds = costs(plan, [1, 1000, 2**53])
@@ -174,7 +174,7 @@ def test_no_scene_is_without_a_cost(extreme, model, stiffness):
             assert seconds[0] < 10  # of one step
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.parametrize("model", ["sliding", "tumbling", "vertical"])
 def test_a_cell_costs_the_same_wherever_it_is(model, contact):
     """Vector units take several numbers at a time, and the last of them one by one: all have to round alike."""

@@ -7,6 +7,7 @@ versions that compile them. What is in it is digested, too, and known by the pro
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import inspect
 import os
@@ -80,20 +81,50 @@ _FOLDER = str(_cache_folder())
 os.environ["NUMBA_CACHE_DIR"] = _FOLDER
 
 import numba  # noqa: E402
-from numba.core.registry import CPUDispatcher  # noqa: E402
-from numba.extending import overload  # noqa: E402
+from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, typed_passes  # noqa: E402
 
 from stiffdice.dynamics.kernel_cache import KernelCache  # noqa: E402
 
 setattr(numba.config, "CACHE_DIR", _FOLDER)  # noqa: B010 (mypy knows no such attribute)
 
 
-class _Part(CPUDispatcher):
-    """A compiled function that is meant for compiled code, without the wrappers for calls from Python.
+# Of these numba has no types.
+_Library: Any = codegen.JITCodeLibrary
+_Lowering: Any = typed_passes.NativeLowering
+_Compiler: Any = compiler.Compiler
+_Dispatcher: Any = registry.CPUDispatcher
+_FunctionCompiler: Any = vars(dispatcher)["_FunctionCompiler"]
+_register_pass: Any = compiler_machinery.register_pass
 
-    They are a third of all time to compile. Who does call it from Python, a test, say, has one made for the call;
+
+class _Kernel(_Dispatcher):  # type: ignore[misc]
+    """A compiled function that Python calls."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, or load what is stored; garbage is left, as most of what that makes stays."""
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            if enabled:
+                gc.enable()
+
+
+class _Part(_Dispatcher):  # type: ignore[misc]
+    """A compiled function that is meant for compiled code, without machine code and wrappers for calls from Python.
+
+    They are half of all time to compile. Who does call it from Python, a test, say, has a kernel made for the call;
     numba's own would jump to nowhere.
     """
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature; what calls for it holds numba's lock, and is what numba times."""
+        arguments = tuple(sig)
+        if arguments not in self.overloads:
+            with self._compiling_counter:
+                self.add_overload(self._compiler.compile(arguments, None))
+        return self.overloads[arguments].entry_point
 
     def add_overload(self, cres: Any) -> None:
         """Keep what was compiled for compiled code to find, and for nobody else."""
@@ -102,6 +133,42 @@ class _Part(CPUDispatcher):
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         bound = inspect.signature(self.py_func).bind(*arguments, **named)
         return _callable(self)(*bound.args)
+
+
+class _PartLibrary(_Library):  # type: ignore[misc]
+    """LLVM code of a part: optimised and turned into machine code with the kernel that takes it in, not before."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@_register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(_Lowering):  # type: ignore[misc]
+    def run_pass(self, state: Any) -> bool:
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        entry = object()  # by which what calls the part finds it
+        state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
+        state["cr"] = state["cr"]._replace(cfunc=entry)
+        return True
+
+
+class _PartCompiler(_Compiler):  # type: ignore[misc]
+    def define_pipelines(self) -> list[Any]:
+        (pipeline,) = super().define_pipelines()
+        pipeline.passes = [
+            (_PartLowering if made is _Lowering else made, description) for made, description in pipeline.passes
+        ]
+        pipeline.finalize()
+        return [pipeline]
 
 
 @cache
@@ -119,15 +186,14 @@ def njit(*function: Any, **options: Any) -> Any:
     Arithmetic is as written unless `fastmath` is asked for here: left unsaid, numba takes it from whoever happens to
     call the function first. What is not kept in the cache on disk is a part of what is, and compiled as such.
     """
-    options = {"error_model": "numpy", "fastmath": False} | options
+    options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
     cached = options.pop("cache", False)
 
     def compiled(python: Callable[..., Any]) -> Any:
         if not cached:
-            wrappers = {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-            return _Part(python, targetoptions=options | wrappers)
-        decorate: Any = numba.njit
-        kernel = decorate(python, **options)
+            bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+            return _Part(python, targetoptions=bare, pipeline_class=_PartCompiler)
+        kernel = _Kernel(python, targetoptions=options)
         kernel._cache = KernelCache(python)
         return kernel
 
@@ -144,21 +210,29 @@ def constant(value: Any) -> Any:
     return body
 
 
-def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Callable[..., Any]:
+class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]
+    """Compiles, for a tag, a call of the body that it stands for."""
+
+    bodies: dict[type, Any]
+
+    def _get_implementation(self, args: Any, kws: Any) -> Any:
+        body = self.bodies[args[0].instance_class]
+        return lambda tag, *arguments: body(*arguments)
+
+
+def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
     """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
-    The first argument is a tag: an empty named tuple that stands for a contact law, a model or a scheme. The body,
+    The first argument is a tag: an empty named tuple that stands for a model or a scheme. The body,
     which gets the arguments after it, is chosen at compile time, which costs nothing in a loop; unlike functions passed
     as arguments it leaves the kernel cacheable on disk, and unlike string literals it does not slow down every call of
     it (1 µs against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
     """
 
+    @njit(forceinline=inlined)
     def call(tag: Any, *arguments: Any) -> Any:
-        raise TypeError("a kernel's part: call it from compiled code")
+        raise TypeError("chosen by the type of the tag")
 
-    @overload(call, strict=False, jit_options={"forceinline": inlined})
-    def _choose(tag: Any, *arguments: Any) -> Any:
-        body = bodies[tag.instance_class]
-        return lambda tag, *arguments: body(*arguments)
-
+    call._compiler.__class__ = _ChoiceCompiler
+    call._compiler.bodies = bodies
     return call

@@ -1,41 +1,21 @@
 """What the ground does to one node: the normal force by contact law, and friction (paper, section 4.2).
 
-A contact law is a tag and a normal force, in `LAWS` and in `push`; its name, and how it damps what comes towards the
-ground, are in `scene/flat_landing.py`. The force is linear in depth and speed wherever it is not zero. The closed forms
-(`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
+Under every contact law (`scene/ground.py`) the force is linear in depth and speed wherever it is not zero. The closed
+forms (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from typing import Any
 
-from stiffdice.dynamics.compilation import by_tag, constant, njit
+from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.simd import where
 from stiffdice.dynamics.vector import Vector, cross, dot, inlined, norm, plus, plus_times, row, times, vector
-from stiffdice.scene.flat_landing import APPROACH_DAMPING
 
 # (fx, fy, fz, torque_x, torque_y, torque_z)
 Wrench = tuple[float, float, float, float, float, float]
 
-
-@inlined
-def _ungated_push(depth: Any, drag: Any, stiffness: float) -> Any:
-    return max(0.0, stiffness * max(0.0, depth) - drag)
-
-
-@inlined
-def _gated_push(depth: Any, drag: Any, stiffness: float) -> Any:
-    return where(depth > 0.0, max(0.0, stiffness * depth - drag), 0.0)
-
-
-# The law of the listings, fn = max(0, S*max(0, d) − D*un): damping and friction act in mid-air, too.
-Ungated = namedtuple("Ungated", ())
-# The law of section 4.2: only a node below the ground feels it.
-Gated = namedtuple("Gated", ())
-
-LAWS = {"ungated": Ungated(), "gated": Gated()}
 
 # The force on a node, as files tell it.
 FORMULA = (
@@ -43,39 +23,41 @@ FORMULA = (
     "if gated only where d > 0; friction -mu f u_t/(|u_t| + 1e-6 r)"
 )
 
-# (law, depth, drag, stiffness) -> the magnitude of the normal force on a node [N], or on each of a vector of nodes.
-# depth [m]: distance below the ground, negative above it. drag [N]: damping × speed along the outward normal.
-push = by_tag({Ungated: _ungated_push, Gated: _gated_push}, inlined=True)
 
-# (law) -> how many times as strong the damping of a flat cube is on the way in as on the way out: where it is more than
-# once, the four nodes above the ground are damped, too, while they fall.
-approach_damping = by_tag({type(law): constant(APPROACH_DAMPING[name]) for name, law in LAWS.items()})
+@inlined
+def push(onset: float, depth: Any, drag: Any, stiffness: float) -> Any:
+    """Return the magnitude of the normal force on a node [N], or on each of a vector of nodes.
+
+    onset [m]: of the contact law. depth [m]: below the ground, negative above it. drag [N]: damping × speed along the
+    outward normal.
+    """
+    return where(depth > onset, max(0.0, stiffness * max(0.0, depth) - drag), 0.0)
 
 
 @njit
-def drags(law: Any) -> bool:
+def drags(physics: Any) -> bool:
     """Return whether the ground pushes a falling node above it, too."""
-    return approach_damping(law) > 1.0
+    return bool(physics.onset < 0.0)
 
 
 @njit
-def reaches(law: Any, clearance: float) -> bool:
-    """Return whether the law can act on a body whose every node is at least `clearance` [m] above the ground."""
-    return drags(law) or clearance <= 0.0
+def reaches(physics: Any, clearance: float) -> bool:
+    """Return whether the ground can act on a body whose every node is at least `clearance` [m] above it."""
+    return drags(physics) or clearance <= 0.0
 
 
 @njit
-def normal_force(law: Any, depth: float, speed: float, stiffness: float, damping: float) -> float:
+def normal_force(physics: Any, depth: float, speed: float) -> float:
     """Return the magnitude of the normal force on one node [N]; speed [m/s]: along the outward normal."""
-    return push(law, depth, damping * speed, stiffness)
+    return push(physics.onset, depth, physics.damping * speed, physics.stiffness)
 
 
 @njit
-def normal_slopes(law: Any, depth: float, speed: float, stiffness: float, damping: float) -> tuple[float, float]:
+def normal_slopes(physics: Any, depth: float, speed: float) -> tuple[float, float]:
     """Return by how much the normal force grows with depth [N/m] and speed [kg/s]; by nothing where there is none."""
-    if not normal_force(law, depth, speed, stiffness, damping) > 0.0:
+    if not normal_force(physics, depth, speed) > 0.0:
         return 0.0, 0.0
-    return (push(law, 1.0, 0.0, stiffness) if depth > 0.0 else 0.0), -damping
+    return (physics.stiffness if depth > 0.0 else 0.0), -physics.damping
 
 
 @inlined
@@ -146,14 +128,14 @@ def swing_square(omega: Any, h: Any, above_rest: Any, speed: Any) -> Any:
 
 
 @njit
-def node_force(law: Any, physics: Any, depth: float, velocity: Vector) -> Vector:
+def node_force(physics: Any, depth: float, velocity: Vector) -> Vector:
     """Return the force on one node [N]: its weight, the normal force and friction, added in the listings' order.
 
     Friction is regularised as in the listings: its direction is u_tan/(|u_tan| + cutoff).
     """
     speed, slip = split(physics, velocity)
     length = norm(slip) + physics.cutoff
-    fn = normal_force(law, depth, speed, physics.stiffness, physics.damping)
+    fn = normal_force(physics, depth, speed)
     push = times(fn, normal_of(physics))
     pressed = Vector(push.x, push.y, push.z - physics.node_weight)
     return plus_times(pressed, -physics.friction * fn, Vector(slip.x / length, slip.y / length, slip.z / length))

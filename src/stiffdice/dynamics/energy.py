@@ -26,13 +26,13 @@ def kinetic(physics: Physics, state: Any) -> float:
 
 
 @njit
-def kinetic_at_place(model: Any, law: Any, physics: Physics, state: Any, lag_time: float) -> float:
+def kinetic_at_place(model: Any, physics: Physics, state: Any, lag_time: float) -> float:
     """Return the kinetic energy [J] at the time of the place, where the velocities are those of `lag_time` [s] before.
 
     They are moved on at the acceleration of the state, as leapfrog's half-step velocities are (Hairer, Lubich and
     Wanner, Geometric Numerical Integration, I.1.4).
     """
-    wrench = models.force(model, law, physics, state)
+    wrench = models.force(model, physics, state)
     velocity = plus_times(vector(state.velocity), lag_time / physics.mass, vector(wrench))
     return _moving(physics, velocity, plus_times(vector(state.angular_momentum), lag_time, vector(wrench[3:])))
 
@@ -67,13 +67,13 @@ def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
 
 
 @njit(cache=True)
-def mechanical(model: Any, law: Any, physics: Physics, states: States, lag_time: float) -> Array:
+def mechanical(model: Any, physics: Physics, states: States, lag_time: float) -> Array:
     """Return kinetic + m g z + the springs' energy [J] of each state at the time of its place, shape (state,).
 
     lag_time [s]: how much earlier than the place the velocities are.
     """
     result = np.empty(states.shape[0])
     for k in range(states.shape[0]):
-        moving = kinetic_at_place(model, law, physics, states[k], lag_time)
+        moving = kinetic_at_place(model, physics, states[k], lag_time)
         result[k] = moving + potential(physics, states[k]) + elastic(physics, states[k])
     return result

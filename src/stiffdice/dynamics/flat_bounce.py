@@ -21,7 +21,6 @@ import math
 from typing import Any
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS, approach_damping
 from stiffdice.dynamics.state import Physics, physics_of
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
@@ -31,7 +30,7 @@ DEAD = 1e150  # past this damping ratio squares leave the range of doubles, and 
 
 
 @njit
-def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> float:
+def rebound_speed(physics: Physics, pull: float, speed_in: float) -> float:
     """Return the speed [m/s] at which a flat cube leaves the ground that it met at `speed_in` [m/s]; 0 if it stays.
 
     Both speeds are along the normal, at a clearance of zero. pull [m/s²]: of gravity, towards the ground. Where that is
@@ -54,16 +53,16 @@ def rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> f
         unit, start, weight = speed_in, 1.0, ratio
     else:
         unit, start, weight = pull / omega, 1.0 / ratio, 1.0
-    square = _rebound_squared(law, zeta, start, weight)
+    square = _rebound_squared(physics.approach_damping, zeta, start, weight)
     if square <= 0.0:
         return 0.0
     return min(unit * math.sqrt(square), speed_in)
 
 
 @njit
-def _rebound_squared(law: Any, zeta: float, start: float, weight: float) -> float:
+def _rebound_squared(approach_damping: float, zeta: float, start: float, weight: float) -> float:
     """Return the square of the speed at lift-off, not positive if there is none; start and weight are a and b."""
-    zeta_in = approach_damping(law) * zeta
+    zeta_in = approach_damping * zeta
     brake = zeta * weight
     decay_in = 2.0 * zeta_in * _duration(zeta_in, weight, start)
     # At the least u that gets out, 4ζb.
@@ -109,9 +108,9 @@ def restitution(scene: Scene, speed_in: float) -> float:
     upward = scene.ground.normal[2]
     if upward < 0:
         raise InputError(f"ground.normal[z] = {upward:g}: a bounce is known for a number >= 0")
-    return float(_rebound_speed(LAWS[scene.ground.contact], physics_of(scene), scene.gravity * upward, speed) / speed)
+    return float(_rebound_speed(physics_of(scene), scene.gravity * upward, speed) / speed)
 
 
 @njit(cache=True)
-def _rebound_speed(law: Any, physics: Physics, pull: float, speed_in: float) -> float:
-    return rebound_speed(law, physics, pull, speed_in)
+def _rebound_speed(physics: Physics, pull: float, speed_in: float) -> float:
+    return rebound_speed(physics, pull, speed_in)

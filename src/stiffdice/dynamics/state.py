@@ -10,6 +10,7 @@ import numpy.typing as npt
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.errors import InputError
 from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -44,6 +45,8 @@ class Physics(NamedTuple):
     stiffness: float
     damping: float
     friction: float
+    onset: float  # [m] depth beyond which a node feels the ground, by its contact law
+    approach_damping: float  # [1] of a flat cube, over that on the way out
     nx: float
     ny: float
     nz: float
@@ -64,9 +67,10 @@ def physics_of(scene: Scene) -> Physics:
         weight += node_weight
     # The margin covers what rotating the nodes step by step can add in round-off.
     reach = float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6)
-    forces = ground.stiffness, ground.damping, ground.friction, *ground.normal, 1e-6 * cube.radius
+    forces = ground.stiffness, ground.damping, ground.friction, *CONTACT_LAWS[ground.contact]
+    plane = *ground.normal, 1e-6 * cube.radius
     sizes = reach, cube.radius, cube.side
-    return Physics(cube.mass, scene.gravity, cube.moment_of_inertia, *forces, node_weight, weight, *sizes)
+    return Physics(cube.mass, scene.gravity, cube.moment_of_inertia, *forces, *plane, node_weight, weight, *sizes)
 
 
 # The models that turn the cube; the others leave its spin out.

@@ -33,6 +33,13 @@ def row(array: Any, k: int) -> Vector:
     return Vector(array[k, 0], array[k, 1], array[k, 2])
 
 
+@njit
+def assign(array: Any, values: Any) -> None:
+    """Copy numbers into an array of as many; a slice takes a second to compile, for the error that it might raise."""
+    for k in range(len(values)):
+        array[k] = values[k]
+
+
 @inlined
 def unit(axis: int) -> Vector:
     """Return the unit vector along an axis."""

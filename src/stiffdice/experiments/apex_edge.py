@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import flat_bounce, linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.experiments.measuring import bisected, mapped, numbers, result, span
 from stiffdice.scene import validation
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.criteria import apex
@@ -78,8 +78,8 @@ def measure(
         ratio = returned(scene.with_ground(contact=law), height)
         return [next((value for value, gain in gains if ratio * gain > _LARGEST_RATIO), math.nan)]
 
-    found = mapped(last_fail, _MEASURED, contact=LAWS, duration=durations, hop_height=heights)
-    found |= mapped(predicted, _PREDICTED, contact=LAWS, hop_height=heights)
+    found = mapped(last_fail, _MEASURED, contact=CONTACT_LAWS, duration=durations, hop_height=heights)
+    found |= mapped(predicted, _PREDICTED, contact=CONTACT_LAWS, hop_height=heights)
     told = {"members": members, "criteria": dataset.criteria_text(_CRITERIA)}
     told["scene_note"] = "contact law and duration are the table's, not the scene's"
     return result(found, "Edge of apex by hop height and duration", scene, MODEL, SCHEME, __name__, **told)

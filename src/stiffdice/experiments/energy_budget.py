@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.experiments.measuring import coordinates, mapped, result
 from stiffdice.scene import validation
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset, energy_budget
 
@@ -48,7 +48,7 @@ def measure(
         found = [np.append(ledger[f"bounce_{name}"].values, missing)[:bounces] for name in of_bounces]
         return [*found, float(ledger["flight_drag_work"])]
 
-    found = mapped(works, _WORKS, contact=LAWS, steps=taken) | coordinates(bounce=range(1, bounces + 1))
+    found = mapped(works, _WORKS, contact=CONTACT_LAWS, steps=taken) | coordinates(bounce=range(1, bounces + 1))
     omega_h = [linear_theory.omega_h(scene, count) for count in taken]
     found["omega_h"] = "steps", omega_h, dataset.CELL_ATTRIBUTES["omega_h"]
     note = "contact law is the dimension's, not the scene's"

@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TOUCHING, TURNING
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity, result
 from stiffdice.experiments.placement import STARTS, at_clearance, clearance, contact_frequency, fall_speed, relaunched
 from stiffdice.integrators.linear_stability import fewest_steps, half_turn_steps
 from stiffdice.scene import validation
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.simulation.criteria.registry import tolerances_of
@@ -112,10 +112,10 @@ def measure(
     def verdict(law: str, value: Any, steps: int) -> list[np.int8]:
         return [_verdict(placed(law, value), model, steps, budget)]
 
-    found = mapped(verdict, {"verdict": ("verdict", "1")}, contact=LAWS, value=span, steps=counts)
+    found = mapped(verdict, {"verdict": ("verdict", "1")}, contact=CONTACT_LAWS, value=span, steps=counts)
     found["verdict"][2].update(dataset.VERDICT_ATTRIBUTES)
     found["value"][2].update(long_name=chosen.long_name, units=chosen.units)
-    limits = [[_limits(placed(law, value), model) for value in span] for law in LAWS]
+    limits = [[_limits(placed(law, value), model) for value in span] for law in CONTACT_LAWS]
     text = "steps at a limit by theory: fewest for contact, drag, turn, most for stall"
     found["limit_steps"] = quantity(("limit", "contact", "value"), np.moveaxis(np.array(limits), -1, 0), text)
     found |= coordinates(limit=LIMITS)

@@ -18,7 +18,6 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models import sliding, tumbling
 from stiffdice.dynamics.state import Array, Physics, States, physics_of, start_of
@@ -27,6 +26,7 @@ from stiffdice.experiments.measuring import coordinates, mapped, numbers, quanti
 from stiffdice.experiments.placement import relaunched, upright
 from stiffdice.experiments.timing import seconds_of
 from stiffdice.scene import validation
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines import stepper
 from stiffdice.simulation.run import Trajectory, simulate
@@ -88,7 +88,7 @@ def measure(
         landing = apart[:, before] if before > 0 else [math.nan] * len(lesser)
         return [parting, landing, *of_full]
 
-    found = mapped(compared, _DESCRIBED, contact=LAWS, friction=frictions, stiffness=grounds)
+    found = mapped(compared, _DESCRIBED, contact=CONTACT_LAWS, friction=frictions, stiffness=grounds)
     found |= coordinates(approximation=APPROXIMATIONS)
     told = {"horizon": horizon, "tolerance": tolerance, "parted": parted}
     note = "contact law, stiffness and friction are the dimensions'"
@@ -205,7 +205,7 @@ def time(scene: Scene, *, steps: int = 20_000, rounds: int = 25) -> xr.Dataset:
 def _starts(scene: Scene, model: str, steps: int) -> list[Callable[[], Callable[[], object]]]:
     """Return what makes ready what is timed of a model, in the order of _KINDS; of `tensor` bare steps only."""
     if model == "tensor":
-        take = partial(take_with_tensor, models.MODELS[MODEL], LAWS[scene.ground.contact], physics_of(scene))
+        take = partial(take_with_tensor, models.MODELS[MODEL], physics_of(scene))
         tensor, h = scene.cube.moment_of_inertia * np.eye(3), scene.duration / steps
         return [lambda: partial(take, start_of(scene, MODEL), tensor.copy(), h, steps)]
     plain = partial(simulate, scene, model=model, scheme=TIMED_SCHEME, steps=steps)
@@ -219,13 +219,11 @@ class _Rows(NamedTuple):
 
 
 @njit(cache=True)
-def take_with_tensor(
-    model: Any, law: Any, physics: Physics, states: States, tensor: Array, h: float, steps: int
-) -> None:
+def take_with_tensor(model: Any, physics: Physics, states: States, tensor: Array, h: float, steps: int) -> None:
     """Take so many steps of symplectic Euler of a body whose tensor of inertia turns with it: I ← R I Rᵀ."""
     state = states[0]
     for _ in range(steps):
-        wrench = models.force(model, law, physics, state)
+        wrench = models.force(model, physics, state)
         models.kick(model, physics, state, wrench, h)
         sliding.drift(physics, state, h)
         _solve_spin(state, tensor)

@@ -16,7 +16,6 @@ import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.rotation import rotated
 from stiffdice.dynamics.state import STATE, Array, physics_of
@@ -31,7 +30,7 @@ from stiffdice.simulation import fixed_step
 from stiffdice.simulation.engines import stepper
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
-_TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL], LAWS["gated"]
+_TAGS = schemes.SCHEMES[SCHEME], MODELS[MODEL]
 
 # By mode: the axis about which a slight turn leaves four, two or one of the upright cube's nodes lowest. An edge and a
 # corner touch the ground with the longest arms when the cube is nearly flat; a steeper one has a lower frequency.

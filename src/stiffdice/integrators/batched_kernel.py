@@ -34,11 +34,12 @@ from stiffdice.scene.scene import Scene
 
 
 class Numbers(NamedTuple):
-    """What a step needs to know, SI units; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h·gravity."""
+    """What a step needs to know, SI units; onset: of the law; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h g."""
 
     h: float
     stiffness: float
     damping: float
+    onset: float
     slip: float
     cutoff: float
     per_mass: float
@@ -52,30 +53,30 @@ Tilted = namedtuple("Tilted", ())
 
 
 @inlined
-def _flat_push(law: Any, k: Numbers, body: Body) -> Any:
+def _flat_push(k: Numbers, body: Body) -> Any:
     half = max(abs(body.a.z), abs(body.b.z))
     half, height = max(half, abs(body.c.z)), body.place.z
     stiffness, drag = 4.0 * k.stiffness, (4.0 * k.damping) * body.velocity.z  # of the four nodes of a face
-    return push(law, half - height, drag, stiffness) + push(law, -half - height, drag, stiffness)
+    return push(k.onset, half - height, drag, stiffness) + push(k.onset, -half - height, drag, stiffness)
 
 
 @inlined
-def _edge_push(law: Any, k: Numbers, height: Any, drag: Any, c: Any) -> Any:
-    return push(law, -c - height, drag, k.stiffness) + push(law, c - height, drag, k.stiffness)
+def _edge_push(k: Numbers, height: Any, drag: Any, c: Any) -> Any:
+    return push(k.onset, -c - height, drag, k.stiffness) + push(k.onset, c - height, drag, k.stiffness)
 
 
 @inlined
-def _face_push(law: Any, k: Numbers, height: Any, drag: Any, b: Any, c: Any) -> Any:
-    return _edge_push(law, k, height + b, drag, c) + _edge_push(law, k, height - b, drag, c)
+def _face_push(k: Numbers, height: Any, drag: Any, b: Any, c: Any) -> Any:
+    return _edge_push(k, height + b, drag, c) + _edge_push(k, height - b, drag, c)
 
 
 @inlined
-def _tilted_push(law: Any, k: Numbers, body: Body) -> Any:
+def _tilted_push(k: Numbers, body: Body) -> Any:
     height, drag, a, b, c = body.place.z, k.damping * body.velocity.z, body.a.z, body.b.z, body.c.z
-    return _face_push(law, k, height + a, drag, b, c) + _face_push(law, k, height - a, drag, b, c)
+    return _face_push(k, height + a, drag, b, c) + _face_push(k, height - a, drag, b, c)
 
 
-# (posture, law, k, body) -> the normal force on all nodes of a cube that does not turn [N].
+# (posture, k, body) -> the normal force on all nodes of a cube that does not turn [N].
 _whole_push = by_tag({Flat: _flat_push, Tilted: _tilted_push}, inlined=True)
 
 
@@ -96,51 +97,51 @@ def _kicked(k: Numbers, velocity: Vector, force: Vector) -> Vector:
 
 
 @inlined
-def _rise(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
+def _rise(posture: Any, k: Numbers, body: Body) -> Body:
     u = body.velocity
-    return _moved(k, body, Vector(u.x, u.y, u.z + (k.per_mass * _whole_push(posture, law, k, body) + k.gain.z)))
+    return _moved(k, body, Vector(u.x, u.y, u.z + (k.per_mass * _whole_push(posture, k, body) + k.gain.z)))
 
 
 @inlined
-def _slide(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
-    push = _whole_push(posture, law, k, body)
+def _slide(posture: Any, k: Numbers, body: Body) -> Body:
+    push = _whole_push(posture, k, body)
     grip = _grip(k, push, body.velocity)
     return _moved(k, body, _kicked(k, body.velocity, Vector(grip * body.velocity.x, grip * body.velocity.y, push)))
 
 
 @inlined
-def _node(law: Any, k: Numbers, height: Any, velocity: Vector) -> Vector:
+def _node(k: Numbers, height: Any, velocity: Vector) -> Vector:
     """Return the force on one node [N], without its weight."""
-    pressed = push(law, -height, k.damping * velocity.z, k.stiffness)
+    pressed = push(k.onset, -height, k.damping * velocity.z, k.stiffness)
     grip = _grip(k, pressed, velocity)
     return Vector(grip * velocity.x, grip * velocity.y, pressed)
 
 
 @inlined
-def _two(law: Any, k: Numbers, height: Any, velocity: Vector, c: Any, by_c: Vector) -> tuple[Vector, Vector]:
+def _two(k: Numbers, height: Any, velocity: Vector, c: Any, by_c: Vector) -> tuple[Vector, Vector]:
     """Return the sum of the forces on the two nodes at ±c from a point that moves so, and their difference."""
-    here = _node(law, k, height + c, plus(velocity, by_c))
-    there = _node(law, k, height - c, minus(velocity, by_c))
+    here = _node(k, height + c, plus(velocity, by_c))
+    there = _node(k, height - c, minus(velocity, by_c))
     return plus(here, there), minus(here, there)
 
 
 @inlined
 def _four(
-    law: Any, k: Numbers, height: Any, velocity: Vector, b: Any, by_b: Vector, c: Any, by_c: Vector
+    k: Numbers, height: Any, velocity: Vector, b: Any, by_b: Vector, c: Any, by_c: Vector
 ) -> tuple[Vector, Vector, Vector]:
     """Return the sum of the forces on the four nodes at ±b±c, and their differences along b and along c."""
-    here, here_c = _two(law, k, height + b, plus(velocity, by_b), c, by_c)
-    there, there_c = _two(law, k, height - b, minus(velocity, by_b), c, by_c)
+    here, here_c = _two(k, height + b, plus(velocity, by_b), c, by_c)
+    there, there_c = _two(k, height - b, minus(velocity, by_b), c, by_c)
     return plus(here, there), minus(here, there), plus(here_c, there_c)
 
 
 @inlined
-def _forces(law: Any, k: Numbers, body: Body) -> tuple[Vector, Vector]:
+def _forces(k: Numbers, body: Body) -> tuple[Vector, Vector]:
     """Return the force on all nodes [N], without their weight, and its torque [N m]: Σ r × f = a × Σ ±f + …"""
     by_a, by_b, by_c = cross(body.spin, body.a), cross(body.spin, body.b), cross(body.spin, body.c)
     height, u = body.place.z, body.velocity
-    here, here_b, here_c = _four(law, k, height + body.a.z, plus(u, by_a), body.b.z, by_b, body.c.z, by_c)
-    there, there_b, there_c = _four(law, k, height - body.a.z, minus(u, by_a), body.b.z, by_b, body.c.z, by_c)
+    here, here_b, here_c = _four(k, height + body.a.z, plus(u, by_a), body.b.z, by_b, body.c.z, by_c)
+    there, there_b, there_c = _four(k, height - body.a.z, minus(u, by_a), body.b.z, by_b, body.c.z, by_c)
     about_b, about_c = cross(body.b, plus(here_b, there_b)), cross(body.c, plus(here_c, there_c))
     return plus(here, there), plus(cross(body.a, minus(here, there)), plus(about_b, about_c))
 
@@ -185,8 +186,8 @@ def _beyond(angle: Vector) -> Any:
 
 
 @inlined
-def _tumble(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
-    force, torque = _forces(law, k, body)
+def _tumble(posture: Any, k: Numbers, body: Body) -> Body:
+    force, torque = _forces(k, body)
     velocity = _kicked(k, body.velocity, force)
     momentum = plus_times(body.momentum, k.h, torque)
     spin = times(k.per_inertia, momentum)
@@ -197,7 +198,7 @@ def _tumble(posture: Any, law: Any, k: Numbers, body: Body) -> Body:
     return Body(plus_times(body.place, k.h, velocity), velocity, momentum, spin, *edges)
 
 
-# (model, posture, law, k, body) -> the state one step later, but for the turn of members that are `unturned`.
+# (model, posture, k, body) -> the state one step later, but for the turn of members that are `unturned`.
 step = by_tag({Vertical: _rise, Sliding: _slide, Tumbling: _tumble}, inlined=True)
 
 
@@ -228,7 +229,7 @@ def numbers_of(physics: Physics, axes: Array, h: float) -> Numbers:
         gain = Vector(*(-h * physics.gravity * axes[:, 2]).tolist())
         per_mass, per_inertia = float(h / mass), float(1.0 / inertia)
     slip, cutoff = -physics.friction, physics.cutoff
-    return Numbers(h, physics.stiffness, physics.damping, slip, cutoff, per_mass, per_inertia, gain)
+    return Numbers(h, physics.stiffness, physics.damping, physics.onset, slip, cutoff, per_mass, per_inertia, gain)
 
 
 def flat(scene: Scene, launches: States) -> bool:

@@ -21,9 +21,9 @@ LAG = -0.5  # the velocity of a step is the path's slope half a step after it: x
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
-    wrench = models.force(model, law, physics, state)
+    wrench = models.force(model, physics, state)
     models.drift(model, physics, state, h)
     models.kick(model, physics, state, wrench, h)
     return 1

@@ -39,20 +39,20 @@ _EVERY_NODE = -1  # in bits
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     weight = 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     height = contact.height_of(physics, state) + h * (
         contact.speed_of(physics, state) - h * physics.gravity * physics.nz
     )
-    if not contact.reaches(law, height - physics.reach):
+    if not contact.reaches(physics, height - physics.reach):
         models.kick(model, physics, state, weight, h)
         models.drift(model, physics, state, h)
         return 1
     slips = _slips(physics, state)
     models.kick(model, physics, state, weight, h)
     models.drift(model, physics, state, h)
-    change = _solved(model, law, physics, state, slips, h)
+    change = _solved(model, physics, state, slips, h)
     models.move(model, state, scaled(change, h))
     m, i = physics.mass, physics.inertia
     impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
@@ -70,27 +70,26 @@ def _slips(physics: Physics, state: Any) -> Array:
 
 
 @njit
-def _solved(model: Any, law: Any, physics: Physics, state: Any, slips: Array, h: float) -> Array:
+def _solved(model: Any, physics: Physics, state: Any, slips: Array, h: float) -> Array:
     """Return by how much the ground changes velocity and spin from those of free flight, shape (6,)."""
     size = 6 if models.turns(model) else 3
     change = np.zeros(6)
     system = np.empty((size, size + 1))
     pressing = _EVERY_NODE
     while True:
-        still = _assemble(law, physics, state, slips, pressing, False, change, system, h)
+        still = _assemble(physics, state, slips, pressing, False, change, system, h)
         if still == pressing:
             break
         pressing = still
         _solve(system, change)
     if pressing != 0 and physics.friction > 0.0:
-        _assemble(law, physics, state, slips, pressing, True, change, system, h)
+        _assemble(physics, state, slips, pressing, True, change, system, h)
         _solve(system, change)
     return change
 
 
 @njit
 def _assemble(
-    law: Any,
     physics: Physics,
     state: Any,
     slips: Array,
@@ -104,7 +103,7 @@ def _assemble(
 
     rubbing: with friction by the normal forces after `change`.
     """
-    system[:] = 0.0
+    system.fill(0.0)
     for k in range(system.shape[0]):
         system[k, k] = physics.mass if k < 3 else physics.inertia
     pressing = 0
@@ -112,8 +111,8 @@ def _assemble(
         arm = row(state.node_offset, k)
         depth = -contact.upward(physics, plus(vector(state.position), arm))
         speed, slip = contact.split(physics, contact.node_velocity(state, k))
-        push = contact.normal_force(law, depth, speed, physics.stiffness, physics.damping)
-        by_depth, by_speed = contact.normal_slopes(law, depth, speed, physics.stiffness, physics.damping)
+        push = contact.normal_force(physics, depth, speed)
+        by_depth, by_speed = contact.normal_slopes(physics, depth, speed)
         stiffening = h * by_depth - by_speed
         along = _lever(arm, contact.normal_of(physics))
         pressed = push - stiffening * _dot(along, change)

@@ -60,10 +60,10 @@ def _step_of(module: Any) -> Any:
     part = module.part
 
     @njit
-    def step(model: Any, law: Any, physics: Any, state: Any, h: float, tolerance: float) -> int:
+    def step(model: Any, physics: Any, state: Any, h: float, tolerance: float) -> int:
         left, evaluations = h, 0
         while left > 0.0:
-            left, count, _ = part(model, law, physics, state, left, tolerance, PART)
+            left, count, _ = part(model, physics, state, left, tolerance, PART)
             evaluations += count
         return evaluations
 
@@ -75,26 +75,26 @@ def _one_of(module: Any) -> Any:
         part = module.part
 
         @njit
-        def one(model: Any, law: Any, physics: Any, state: Any, sight: Any, tolerance: float) -> tuple[int, int]:
+        def one(model: Any, physics: Any, state: Any, sight: Any, tolerance: float) -> tuple[int, int]:
             h = sight.pending if sight.pending > 0.0 else sight.step_size
-            sight.pending, evaluations, work = part(model, law, physics, state, h, tolerance, PART)
+            sight.pending, evaluations, work = part(model, physics, state, h, tolerance, PART)
             sight.work += work
             return 0 if sight.pending > 0.0 else 1, evaluations
     else:
         step = module.step
 
         @njit
-        def one(model: Any, law: Any, physics: Any, state: Any, sight: Any, tolerance: float) -> tuple[int, int]:
-            return 1, step(model, law, physics, state, sight.step_size, tolerance)
+        def one(model: Any, physics: Any, state: Any, sight: Any, tolerance: float) -> tuple[int, int]:
+            return 1, step(model, physics, state, sight.step_size, tolerance)
 
     return one
 
 
-# (scheme, model, law, physics, state, h, tolerance) -> force evaluations, or pieces in closed form: advance `state` by
+# (scheme, model, physics, state, h, tolerance) -> force evaluations, or pieces in closed form: advance `state` by
 # one step of h [s]. Only a scheme that controls its own error looks at the tolerance [1] of it.
 step = _chosen(_step_of)
 
-# (scheme, model, law, physics, state, sight, tolerance) -> steps done, 0 or 1, and force evaluations: advance `state`
+# (scheme, model, physics, state, sight, tolerance) -> steps done, 0 or 1, and force evaluations: advance `state`
 # by one step, or by a part of it; `sight.pending` is what is left of it then [s], and `sight.work` what was done.
 one = _chosen(_one_of)
 

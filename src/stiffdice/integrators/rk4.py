@@ -19,7 +19,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import STATE, Motion, Physics
-from stiffdice.dynamics.vector import Vector, cross, times, vector
+from stiffdice.dynamics.vector import Vector, assign, cross, times, vector
 from stiffdice.integrators.free_flight import plus, scaled
 
 RK4 = namedtuple("RK4", ())
@@ -33,7 +33,7 @@ _NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
     begin = np.empty(1, STATE)
     begin[0] = state
@@ -41,7 +41,7 @@ def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance
     for far, weight in _STAGES:
         if far > 0.0:
             _advance(model, physics, begin, state, motion, force, far * h)
-        force, motion = _slope(model, law, physics, state, motion, far * h)
+        force, motion = _slope(model, physics, state, motion, far * h)
         mean_force, mean_motion = plus(mean_force, force, weight), plus(mean_motion, motion, weight)
     _advance(model, physics, begin, state, mean_motion, mean_force, h)
     return len(_STAGES)
@@ -53,18 +53,21 @@ def _advance(
 ) -> None:
     """Put `state` where these slopes lead in h [s] from the step's begin."""
     start = begin[0]
-    state.position[:], state.velocity[:] = start.position, start.velocity
-    state.angular_momentum[:], state.node_offset[:] = start.angular_momentum, start.node_offset
+    assign(state.position, start.position)
+    assign(state.velocity, start.velocity)
+    assign(state.angular_momentum, start.angular_momentum)
+    for k in range(len(start.node_offset)):
+        assign(state.node_offset[k], start.node_offset[k])
     models.move(model, state, scaled(motion, h))
     models.kick(model, physics, state, force, h)
 
 
 @njit
-def _slope(model: Any, law: Any, physics: Physics, state: Any, taken: Motion, h: float) -> tuple[Wrench, Motion]:
+def _slope(model: Any, physics: Physics, state: Any, taken: Motion, h: float) -> tuple[Wrench, Motion]:
     """Return the slopes of the momenta and of place and rotation vector, h [s] of `taken` from the step's begin."""
     ux, uy, uz, wx, wy, wz = models.motion(model, physics, state)
     turned = times(h, vector(taken[3:]))
     a = cross(turned, Vector(wx, wy, wz))
     b = cross(turned, a)
     turning = wx - a.x / 2 + b.x / 12, wy - a.y / 2 + b.y / 12, wz - a.z / 2 + b.z / 12
-    return models.force(model, law, physics, state), (ux, uy, uz, *turning)
+    return models.force(model, physics, state), (ux, uy, uz, *turning)

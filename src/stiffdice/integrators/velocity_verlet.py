@@ -28,12 +28,12 @@ LAG = 0.0  # the velocity is the path's slope at the place: x_(n+1) = x_n + h u_
 
 
 @njit
-def step(model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
+def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -> int:
     """Advance `state` by one step of h [s] and return how often the force was evaluated."""
-    old = models.force(model, law, physics, state)
+    old = models.force(model, physics, state)
     models.kick(model, physics, state, old, h / 2)
     models.drift(model, physics, state, h)
     models.kick(model, physics, state, old, h / 2)
-    new = models.force(model, law, physics, state)
+    new = models.force(model, physics, state)
     models.kick(model, physics, state, plus(new, old, -1.0), h / 2)
     return 2

@@ -18,10 +18,23 @@ the cube falls: ζ_in = 2ζ.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-# How many times as strong the damping of a flat cube is on the way in as on the way out, by contact law.
-APPROACH_DAMPING = {"ungated": 2.0, "gated": 1.0}
-CONTACT_LAWS = tuple(APPROACH_DAMPING)
+
+class ContactLaw(NamedTuple):
+    """When a node at a depth d, moving outwards at u, feels the ground's max(0, S max(0, d) − D u).
+
+    onset [m]: the depth beyond which it does. approach_damping [1]: how many times as strong the damping of a flat
+    cube, nodes above the ground included, is on the way in as on the way out.
+    """
+
+    onset: float
+    approach_damping: float
+
+
+# ungated: the law of the listings, damping and friction act in mid-air, too. gated: that of the paper's section 4.2,
+# only a node below the ground feels it.
+CONTACT_LAWS = {"ungated": ContactLaw(-math.inf, 2.0), "gated": ContactLaw(0.0, 1.0)}
 
 
 def leg(zeta: float) -> float:
@@ -35,7 +48,7 @@ def leg(zeta: float) -> float:
 
 def duration(law: str, zeta: float) -> float:
     """Return how long the contact lasts [1/ω], until its force is zero. law: contact law; zeta [1]: on the way out."""
-    return leg(APPROACH_DAMPING[law] * zeta) + leg(zeta)
+    return leg(CONTACT_LAWS[law].approach_damping * zeta) + leg(zeta)
 
 
 def restitution(law: str, zeta: float) -> float:
@@ -45,7 +58,7 @@ def restitution(law: str, zeta: float) -> float:
 
 def _loss(law: str, zeta: float) -> float:
     """Return −ln e."""
-    approach = APPROACH_DAMPING[law] * zeta
+    approach = CONTACT_LAWS[law].approach_damping * zeta
     return approach * leg(approach) + zeta * leg(zeta)
 
 

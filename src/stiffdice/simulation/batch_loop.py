@@ -109,7 +109,7 @@ def _run_on(common: Common, block: Array) -> int:
     earlier, due, limit = row_of(width, block, SPEED), row_of(width, block, DUE), row_of(width, block, LIMIT)
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
-        new = batched_kernel.step(common.system.model, common.posture, common.system.law, common.k, body)
+        new = batched_kernel.step(common.system.model, common.posture, common.k, body)
         now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         energy = _energy(e, new)
         up = now > 0.0
@@ -289,7 +289,7 @@ def start(task: Task) -> Callable[[], bool] | None:
         return None
     axes, h = member_block.axes_of(scene), setup.step_size
     k, e = batched_kernel.numbers_of(system.physics, axes, h), _balance(system.physics, axes, h, members.sight)
-    if not np.isfinite([*k[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
+    if not np.isfinite([*k._replace(onset=0.0)[:-1], *k.gain, *e[:2], *e.weight, *e.lagging, *e[4:]]).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)

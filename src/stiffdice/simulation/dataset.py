@@ -15,20 +15,20 @@ import xarray as xr
 from stiffdice import __version__
 from stiffdice.dynamics import contact, linear_theory
 from stiffdice.dynamics.code_digest import code_digest
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
 from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import Run
 
-CONTACT_ATTRIBUTES = schema.attributes_of("shard", "contact", list(LAWS))
+CONTACT_ATTRIBUTES = schema.attributes_of("shard", "contact", list(CONTACT_LAWS))
 VERDICTS = [verdict.name.lower() for verdict in Verdict]
 VERDICT_ATTRIBUTES = schema.attributes_of("shard", "verdict", VERDICTS)
 # What numbers and files depend on besides our code.

@@ -29,7 +29,6 @@ import xarray as xr
 from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import (
-    LAWS,
     height_of,
     node_force,
     node_velocity,
@@ -131,8 +130,8 @@ class _Books:
     """The ledger of a run so far. done: steps booked. bounces: how many. energies [J]: at the launch and now."""
 
     def __init__(self, setup: Setup) -> None:
-        self.setup, self._physics, law = setup, physics_of(setup.scene), LAWS[setup.scene.ground.contact]
-        self._tags = schemes.SCHEMES[setup.scheme], MODELS[setup.model], law
+        self.setup, self._physics = setup, physics_of(setup.scene)
+        self._tags = schemes.SCHEMES[setup.scheme], MODELS[setup.model]
         self._rows = np.zeros(min(LARGEST, setup.steps), _ROW)
         self._accounts = np.zeros(_BOUNCES + len(self._rows), _ACCOUNT)
         self._state = start_of(setup.scene, setup.model)
@@ -141,7 +140,7 @@ class _Books:
 
     def _views(self, states: States) -> npt.NDArray[np.void]:
         views, late = np.zeros(len(states), _VIEW), self.setup.lag * self.setup.step_size
-        _look(self._tags[-1], self._physics._replace(node_weight=0.0), states, late, views)
+        _look(self._physics._replace(node_weight=0.0), states, late, views)
         return views
 
     def advance(self, count: int) -> bool:
@@ -214,7 +213,7 @@ class _Books:
 
 
 @njit(cache=True)
-def _look(law: Any, physics: Physics, states: States, late: float, views: npt.NDArray[np.void]) -> None:
+def _look(physics: Physics, states: States, late: float, views: npt.NDArray[np.void]) -> None:
     """View states whose velocity is `late` [s]; physics: without the nodes' weight, so that forces are the ground's."""
     for k in range(len(states)):
         state, view = states[k], views[k]
@@ -226,24 +225,24 @@ def _look(law: Any, physics: Physics, states: States, late: float, views: npt.ND
         view.potential = energy.potential(physics, state)
         view.elastic = energy.elastic(physics, state)
         view.lag = physics.mass * fall * (state.velocity[2] - 0.5 * fall)
-        view.clearance = _feel(law, physics, state, view.forces)
+        view.clearance = _feel(physics, state, view.forces)
 
 
 @njit
-def _feel(law: Any, physics: Physics, state: Any, forces: Any) -> float:
+def _feel(physics: Physics, state: Any, forces: Any) -> float:
     """Add up each force of the ground over the nodes, as the models do, and return the clearance [m]."""
     clearance = height_of(physics, state) - physics.reach
-    if not reaches(law, clearance):
+    if not reaches(physics, clearance):
         return float(clearance)
     clearance = math.inf
     n = normal_of(physics)
     for k in range(len(state.node_offset)):
         arm, velocity = row(state.node_offset, k), node_velocity(state, k)
         depth = -upward(physics, plus(vector(state.position), arm))
-        force = node_force(law, physics, depth, velocity)
+        force = node_force(physics, depth, velocity)
         if depth > 0.0:
             spring, speed = physics.stiffness * depth, upward(physics, velocity)
-            push = normal_force(law, depth, speed, physics.stiffness, physics.damping)
+            push = normal_force(physics, depth, speed)
             _pull(forces[_SPRING], arm, times(spring, n))
             _pull(forces[_DAMPING], arm, times(push - spring, n))
             _pull(forces[_FRICTION], arm, plus_times(force, -push, n))

@@ -42,7 +42,7 @@ def undisturbed(system: System, sight: Any) -> float:
 
     Under a law that drags on falling nodes that is as long as all rise, which is known only where none turns.
     """
-    if not (drags(system.law) and models.touches(system.model)):
+    if not (drags(system.physics) and models.touches(system.model)):
         return math.inf
     if models.turns(system.model) or sight.speed < 0.0:
         return 0.0
@@ -154,7 +154,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
 
     That is for at most `most` [s]; 0 where it changes now.
     """
-    law, physics = system.law, system.physics
+    physics = system.physics
     stiffness, damping = physics.stiffness, physics.damping
     c, u = sight.clearance, sight.speed
     square, rate, constant = 0.0, 0.0, -sight.pull
@@ -165,7 +165,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
                 square += 4 * stiffness / physics.mass
                 rate += 4 * damping / physics.mass
                 constant -= 4 * stiffness / physics.mass * (face * sight.room)
-        elif u < 0.0 and reaches(law, clearance):
+        elif u < 0.0 and reaches(physics, clearance):
             rate += 4 * damping / physics.mass
     lasts, changes = _bounds(square, rate, constant - square * c - rate * u, u, sight.step_size)
     lasts = min(lasts, most)
@@ -175,7 +175,7 @@ def phase_of(system: System, sight: Any, most: float) -> tuple[float, float, flo
         if clearance < 0.0:
             push = -stiffness * clearance - damping * u
             lasts = min(lasts, _until_zero(push, stiffness, damping, u, changes, sight.step_size))
-        elif damping > 0.0 and reaches(law, clearance):
+        elif damping > 0.0 and reaches(physics, clearance):
             lasts = min(lasts, _until_zero(u, 0.0, 1.0, u, changes, sight.step_size))
     return square, rate, constant, lasts
 
@@ -191,7 +191,7 @@ def resting_swing(system: System, sight: Any) -> float:
     """
     physics = system.physics
     h, omega = sight.step_size, math.sqrt(4 * physics.stiffness / physics.mass)
-    damped = h * (8.0 if drags(system.law) else 4.0) * physics.damping / physics.mass
+    damped = h * (8.0 if drags(system.physics) else 4.0) * physics.damping / physics.mass
     if omega * h > 0.5 or damped > 1.0 or not 0.0 < 2 * sight.sag < sight.room:
         return -1.0
     grows = math.exp(0.3 * sight.steps * damped * (omega * h) ** 2)
@@ -218,7 +218,7 @@ def _hangs(system: System, sight: Any) -> bool:
     """Return whether a flat cube that sinks through the air as fast as its drag allows ends before it lands."""
     drag, mass = 8 * system.physics.damping, system.physics.mass
     weight = mass * sight.pull
-    if sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0 or not drags(system.law):
+    if sight.flight < 2.0 or not -sight.speed * drag > 0.999 * weight > 0.0 or not drags(system.physics):
         return False
     if drag * sight.step_size > mass:
         return False

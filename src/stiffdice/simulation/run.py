@@ -209,7 +209,7 @@ def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None
 def _judged(task: Task, tolerances: dict[str, float]) -> Run:
     """Return the run that is over, with its verdicts."""
     setup, members = task.setup, task.members
-    finish(task.system, members)
+    finish(task.system.physics, members)
     measures = values(members.memory)
     ended = judge.ending(measures, judge.endings_of(task))
     return Run(
@@ -290,7 +290,7 @@ def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: 
 def _one(scheme: Any, system: System, member: Member, tolerance: float) -> tuple[int, int]:
     """Take a step, or a part of it; return the steps done and force evaluations."""
     state, sight = member.state, member.sight
-    return schemes.one(scheme, system.model, system.law, system.physics, state, sight, tolerance)
+    return schemes.one(scheme, system.model, system.physics, state, sight, tolerance)
 
 
 @njit

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of
 from stiffdice.errors import InputError
@@ -19,10 +18,9 @@ LARGEST_TRAJECTORY = 5_000_000  # samples kept in memory for one run: 1.4 GB
 
 
 class System(NamedTuple):
-    """What moves, as compiled functions take it: the tags of the model and of the contact law, the scene's numbers."""
+    """What moves, as compiled functions take it: the tag of the model, the scene's numbers."""
 
     model: Any
-    law: Any
     physics: Physics
 
 
@@ -88,7 +86,7 @@ class Task(NamedTuple):
     def system(self) -> System:
         """What moves."""
         scene = self.setup.scene
-        return System(MODELS[self.setup.model], LAWS[scene.ground.contact], physics_of(scene))
+        return System(MODELS[self.setup.model], physics_of(scene))
 
 
 def room_for(steps: int, every: int | None) -> States:

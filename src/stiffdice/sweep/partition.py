@@ -24,9 +24,9 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.sweep import cost_model
 from stiffdice.sweep.grid import Piece, Sweep
 
@@ -88,7 +88,7 @@ def refined(sweep: Sweep, survey: xr.Dataset, number: int) -> list[Piece]:
     passing = 1 - survey.failing.values[criteria] / sweep.members
     contact, stiffness, steps = (survey[name].values for name in ("contact", "stiffness", "steps"))
     for column in sweep.columns():
-        law = list(LAWS).index(column.contact)
+        law = list(CONTACT_LAWS).index(column.contact)
         here = slice(*np.searchsorted(contact, [law, law + 1]))
         low, high = (
             here.start + np.searchsorted(stiffness[here], column.stiffness, side) for side in ("left", "right")

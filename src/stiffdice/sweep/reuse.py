@@ -15,11 +15,11 @@ from typing import Any
 import numpy.typing as npt
 import xarray as xr
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.errors import InputError
 from stiffdice.io import reader
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.text_file import rows_of
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.sweep.grid import Column, Piece, Sweep
 from stiffdice.sweep.shard import Known, differing, shard_pattern
 
@@ -27,7 +27,7 @@ Cell = tuple[int, float, int]  # number of the contact law, stiffness [kg/s²], 
 
 
 def _cell(column: Column, steps: int) -> Cell:
-    return list(LAWS).index(column.contact), column.stiffness, steps
+    return list(CONTACT_LAWS).index(column.contact), column.stiffness, steps
 
 
 class Kept:

@@ -11,12 +11,12 @@ import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import RefusedError
 from stiffdice.io import schema
 from stiffdice.io.content_digest import CELL
 from stiffdice.io.shard_writer import CHUNK_CELLS, CHUNK_MEMBERS, Spool
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import backend, dataset
 from stiffdice.simulation.criteria import registry as criteria
 from stiffdice.simulation.initial_conditions import phased, turned
@@ -31,7 +31,7 @@ Known = Callable[[slice], Mapping[str, npt.NDArray[Any]]]
 _OF_RUNS = ("touchdown_phase", "verdict", "ending", "steps_done", "steps_computed", "decided")
 
 # Words of the enums of shards and sweeps.
-MEANINGS = {"contact": list(LAWS), "verdict": dataset.VERDICTS, "ending": dataset.VERDICTS}
+MEANINGS = {"contact": list(CONTACT_LAWS), "verdict": dataset.VERDICTS, "ending": dataset.VERDICTS}
 
 # Members computed together: their references are in memory together.
 BLOCK = CHUNK_MEMBERS
@@ -93,7 +93,7 @@ def _compute_piece(
 def _cell_values(sweep: Sweep, column: Column, scan: Sequence[int]) -> dict[str, Any]:
     scene = sweep.scene_of(column)
     return {
-        "contact": np.full(len(scan), list(LAWS).index(column.contact), np.int8),
+        "contact": np.full(len(scan), list(CONTACT_LAWS).index(column.contact), np.int8),
         "stiffness": np.full(len(scan), column.stiffness),
         "steps": np.array(scan, np.int64),
         "omega_h": np.array([linear_theory.omega_h(scene, steps) for steps in scan]),
@@ -143,7 +143,7 @@ def checked_shard(parts: Iterable[xr.Dataset], sweep: Sweep, pieces: Sequence[Pi
     like = shard_pattern(sweep)
     scans = [len(piece.steps) for piece in pieces]
     planned = {
-        "contact": np.repeat([list(LAWS).index(piece.column.contact) for piece in pieces], scans),
+        "contact": np.repeat([list(CONTACT_LAWS).index(piece.column.contact) for piece in pieces], scans),
         "stiffness": np.repeat([piece.column.stiffness for piece in pieces], scans),
         "steps": np.array([steps for piece in pieces for steps in piece.steps]),
     }

@@ -18,10 +18,10 @@ import xarray as xr
 from stiffdice import __version__
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.code_digest import code_digest
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.io import schema
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 # What a scan has edges of, and the numbers of a power law through an edge (`io.schema`).
 EDGES = ("first_pass", "last_fail", "steps_needed")
@@ -156,7 +156,7 @@ def _dataset(
         **{f"cell_{name}": sweep[name].values for name in ("contact", "stiffness", "steps", "omega_h")},
     }
     names = {"criterion": meanings_of(sweep.criterion), "edge": EDGES}
-    meanings = names | {key: list(LAWS) for key in ("contact", "cell_contact")}
+    meanings = names | {key: list(CONTACT_LAWS) for key in ("contact", "cell_contact")}
     attributes = sweep.attrs | {
         "title": "Edges of stability",
         "kind": "frontier",

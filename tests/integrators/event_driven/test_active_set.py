@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.integrators.event_driven import active_set
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 
 RANDOM = np.random.default_rng(5)
 
 
 @njit(cache=True)
-def law_force(model, law, physics, state):
-    return models.force(model, law, physics, state[0])
+def law_force(model, physics, state):
+    return models.force(model, physics, state[0])
 
 
 @njit(cache=True)
@@ -71,7 +71,7 @@ def rate_of(contact, motion):
     return rate
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
 def test_the_forces_are_those_of_the_law(law, model):
     touched = 0
@@ -79,7 +79,7 @@ def test_the_forces_are_those_of_the_law(law, model):
         scene = landing(law, height=float(height), normal=[0.1, -0.2, 0.9])
         contact, motion = begun(scene, model)
         rate = rate_of(contact, motion)
-        wrench = law_force(models.MODELS[model], LAWS[law], physics_of(scene), start_of(scene, model))
+        wrench = law_force(models.MODELS[model], physics_of(scene), start_of(scene, model))
         np.testing.assert_allclose(rate[3:6] * scene.cube.mass, wrench[:3], rtol=1e-12, atol=1e-10)
         if model == "tumbling":
             np.testing.assert_allclose(rate[6:9], wrench[3:], rtol=1e-12, atol=1e-9)
@@ -93,7 +93,7 @@ def test_the_quaternion_turns_at_the_spin():
     np.testing.assert_allclose(rate[9:13], [0, *(spin / 2)], atol=1e-15)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", CONTACT_LAWS)
 def test_switches_change_as_their_slopes_say(law):
     for _ in range(20):
         contact, motion = begun(landing(law))

@@ -7,8 +7,8 @@ import pytest
 from tests.integrators.event_driven.test_active_set import begun, landing, rate_of
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.integrators.event_driven import active_set, held_contact
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 
 
 @njit(cache=True)
@@ -31,7 +31,7 @@ def retouch(contact, motion, about):
     return held_contact.retouch(contact, motion, about)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("times", [1.0, 2.0])
 def test_slopes_are_those_of_the_rates(law, times):
     """Central differences: a change of place and rotation moves the nodes, at the same u and L.

@@ -15,7 +15,6 @@ from mpmath import mpf
 from scipy.integrate import solve_ivp
 
 from stiffdice.dynamics import flat_bounce
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.errors import InputError
@@ -23,6 +22,7 @@ from stiffdice.integrators import registry as schemes
 from stiffdice.integrators.exact import regularised_friction
 from stiffdice.integrators.exact.oscillator import Oscillator, after, first_zero, response
 from stiffdice.scene.cube import Cube
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.run import simulate
@@ -204,7 +204,7 @@ FALLS = [
 
 
 @pytest.mark.parametrize(("given", "duration"), FALLS)
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_the_motion_against_40_digits(contact, given, duration):
     """Speeds up to 10 m/s: units in the last place of 1e-15, which each bounce makes larger as it does a launch's.
 
@@ -224,7 +224,7 @@ SLIDES = [
 
 
 @pytest.mark.parametrize(("given", "velocity", "duration"), SLIDES)
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.long
 def test_a_slide_against_40_digits(contact, given, velocity, duration):
     scene = scene_of(contact, velocity=velocity, duration=duration, **given)
@@ -233,7 +233,7 @@ def test_a_slide_against_40_digits(contact, given, velocity, duration):
     assert error.max() < 5e-15 * growth_of(scene)
 
 
-TWO_LAWS_TWO_BRANCHES = list(itertools.product(LAWS, [1e3, 1e6, 1e12], [0.0, 0.01, 0.3, 0.999, 1.5, 5.0]))
+TWO_LAWS_TWO_BRANCHES = list(itertools.product(CONTACT_LAWS, [1e3, 1e6, 1e12], [0.0, 0.01, 0.3, 0.999, 1.5, 5.0]))
 
 
 @pytest.mark.parametrize(("contact", "stiffness", "zeta"), TWO_LAWS_TWO_BRANCHES)
@@ -263,7 +263,7 @@ def test_a_flat_bounce_has_the_exact_restitution(contact, stiffness, zeta):
         ({"stiffness": 1e12, "damping": 3e5, "friction": 0.3}, 1e-10),
     ],
 )
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_how_the_time_is_split_changes_nothing(contact, given, most):
     """But for a rounding in each step, of numbers up to 20."""
     scene = scene_of(contact, duration=4.0, **given)
@@ -272,7 +272,7 @@ def test_how_the_time_is_split_changes_nothing(contact, given, most):
         np.testing.assert_allclose(end_of(scene, steps), whole, rtol=0, atol=(most + 2e-15 * steps) * growth)
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.long
 def test_tiny_steps_through_a_contact(contact):
     """A million steps of 1e-12 s on ground of 1e12 kg/s²: 2 radians in its spring."""
@@ -282,7 +282,7 @@ def test_tiny_steps_through_a_contact(contact):
     np.testing.assert_allclose(end, end_of(scene), rtol=0, atol=2e6 * 1e-16 * 1000)  # ω, half a unit, √steps
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_swings_of_a_cube_that_rests_are_taken_at_once(contact):
     """Against a hundred thousand steps of a few swings each."""
     near = scene_of(contact, 1e8, 5.0, position=(0, 0, HALF - 3e-8), velocity=(0, 0, 0), duration=1.0)
@@ -307,7 +307,7 @@ def test_swings_of_a_cube_that_slides_are_taken_at_once():
     np.testing.assert_allclose(once.end["velocity"][0, 0], each.end["velocity"][0, 0], rtol=1e-12)
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_energy_is_lost_to_damping_drag_and_friction_alone(contact):
     """The works that the ledger adds up along the exact path are its loss of energy, but for steps of a touch-down."""
     scene = scene_of(contact, 1e3, 0.2, 0.1, duration=4.0, orientation=TILTED)
@@ -317,7 +317,7 @@ def test_energy_is_lost_to_damping_drag_and_friction_alone(contact):
         assert abs(run.scheme_work) < 40 * 4.0 / steps
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 def test_scipy_agrees(contact):
     """DOP853 on the sum of the node forces, over two sliding bounces."""
     scene = scene_of(contact, 1e3, 0.5, 0.1, velocity=(5, 1, 2), duration=3.0)
@@ -336,7 +336,7 @@ def test_scipy_agrees(contact):
     np.testing.assert_allclose(end_of(scene), found, rtol=0, atol=2e-9)
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.long
 def test_the_papers_scheme_converges_to_it(contact):
     scene = scene_of(contact, 1e4, 0.2, 0.075, duration=2.5)
@@ -414,7 +414,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3)
 
 @settings(max_examples=150)
 @given(
-    st.sampled_from(list(LAWS)),
+    st.sampled_from(list(CONTACT_LAWS)),
     sizes,
     st.one_of(st.just(0.0), st.floats(-4, 8).map(lambda exponent: 10**exponent)),
     st.floats(0, 2),
@@ -439,7 +439,7 @@ def test_any_cube_keeps_going_and_gains_no_energy(
     assert (np.diff(energy) <= 1e-12 * (1 + np.abs(energy[:-1]) + kinetic + 10 * gravity)).all()
 
 
-@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("contact", CONTACT_LAWS)
 @pytest.mark.parametrize(
     ("stiffness", "damping"), [(0, 0), (0, 1e300), (1e300, 0), (1e300, 1e300), (1e-300, 1e-3), (1e70, 1e170)]
 )

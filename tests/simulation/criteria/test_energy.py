@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.scene.scene import Scene, from_mapping
@@ -40,7 +39,7 @@ def test_a_flight_neither_gains_nor_loses(model, steps):
     scene = from_mapping({"ground": GATED, "launch": launch, "duration": 4.0})
     states = simulate(scene, model=model, steps=steps, every=1).trajectory.state
     physics, sight, slots = physics_of(scene), np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
-    system = System(MODELS[model], LAWS["gated"], physics)
+    system = System(MODELS[model], physics)
     sight["step_size"], sight["lag"] = 4.0 / steps, 0.5
     for first, second in ((0, steps), (steps, 0), (steps // 2, 1), (steps // 4, steps // 2)):
         monitor.start(sight[0], physics, states[first])
@@ -83,7 +82,7 @@ def test_it_counts_only_the_air():
     sight, slots = np.zeros(1, SIGHT), np.zeros(energy.SLOTS)
     sight["step_size"], sight["lag"] = 1e-3, 0.5
     monitor.start(sight[0], physics, state[0])
-    system = System(MODELS["tumbling"], LAWS["ungated"], physics)
+    system = System(MODELS["tumbling"], physics)
     energy.start(slots, sight[0], system, state[0])
     state["velocity"] *= 10
     for flight, expected in ((0, 1), (1, 50)):

@@ -67,7 +67,7 @@ def test_the_launch_comes_first_and_nodes_keep_their_distances():
 def test_the_jacobian_says_how_the_slope_changes():
     """In a contact, along random directions; the force's parts are linear in depth and nearly so in the rest."""
     scene = from_mapping(THROW, "as_written")
-    slope, slopes = scipy_ivp.equations("tumbling", "gated")
+    slope, slopes = scipy_ivp.equations("tumbling")
     room = scipy_ivp.room_of(scene, start_of(scene, "tumbling"))
     y = np.concatenate([[0.0, 0.0, 0.4], [3.0, 1.0, -2.0], [0.3, 0.5, 0.2], [0.9, 0.3, 0.2, 0.1]])
     jacobian = slopes(0.0, y, room, np.ones(len(y)))

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import xarray as xr
 
-from stiffdice.dynamics.contact import LAWS
+from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import energy_budget
 from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.simulation.dataset import AXES
@@ -15,8 +15,8 @@ from stiffdice.sweep import stability_limits
 
 _VERDICTS = tuple(verdict.name.lower() for verdict in Verdict)
 _REGISTRIES: dict[str, Sequence[str]] = {
-    "contact": tuple(LAWS),
-    "cell_contact": tuple(LAWS),
+    "contact": tuple(CONTACT_LAWS),
+    "cell_contact": tuple(CONTACT_LAWS),
     "verdict": _VERDICTS,
     "ending": _VERDICTS,
     "criterion": tuple(CRITERIA),

@@ -18,6 +18,6 @@ drift = tumbling.drift
 
 
 @njit
-def force(law: Any, physics: Physics, state: Any) -> Wrench:
+def force(physics: Physics, state: Any) -> Wrench:
     """Return the weight [N]: there is no ground."""
     return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0

@@ -28,7 +28,7 @@ def _chosen(part: str) -> Callable[..., Any]:
     return by_tag({type(module.TAG): getattr(module, part) for module in _MODULES.values()})
 
 
-# (model, law, physics, state) -> force [N] and torque [N m] on the body in this state.
+# (model, physics, state) -> force [N] and torque [N m] on the body in this state.
 force = _chosen("force")
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
 kick = _chosen("kick")

@@ -15,14 +15,14 @@ TAG = Sliding()
 
 
 @njit
-def force(law: Any, physics: Physics, state: Any) -> Wrench:
+def force(physics: Physics, state: Any) -> Wrench:
     """Return the total force on the cube [N]; its torque is left out."""
-    if not reaches(law, height_of(physics, state) - physics.reach):
+    if not reaches(physics, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     place, velocity, total = vector(state.position), vector(state.velocity), Vector(0.0, 0.0, 0.0)
     for k in range(len(state.node_offset)):
         depth = -upward(physics, plus(place, row(state.node_offset, k)))
-        total = plus(total, node_force(law, physics, depth, velocity))
+        total = plus(total, node_force(physics, depth, velocity))
     return total.x, total.y, total.z, 0.0, 0.0, 0.0
 
 

@@ -21,14 +21,14 @@ TAG = Tumbling()
 
 
 @njit
-def force(law: Any, physics: Physics, state: Any) -> Wrench:
+def force(physics: Physics, state: Any) -> Wrench:
     """Return the total force [N] and torque about the centre [N m] (equations 3 and 10)."""
-    if not reaches(law, height_of(physics, state) - physics.reach):
+    if not reaches(physics, height_of(physics, state) - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     place, total, torque = vector(state.position), Vector(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
     for k in range(len(state.node_offset)):
         arm = row(state.node_offset, k)
-        on_node = node_force(law, physics, -upward(physics, plus(place, arm)), node_velocity(state, k))
+        on_node = node_force(physics, -upward(physics, plus(place, arm)), node_velocity(state, k))
         total, torque = plus(total, on_node), plus(torque, cross(arm, on_node))
     return total.x, total.y, total.z, torque.x, torque.y, torque.z
 

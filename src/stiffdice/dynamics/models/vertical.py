@@ -18,15 +18,15 @@ TAG = Vertical()
 
 
 @njit
-def force(law: Any, physics: Physics, state: Any) -> Wrench:
+def force(physics: Physics, state: Any) -> Wrench:
     """Return the normal forces and the weight [N]; friction and torque are left out."""
     z, speed = state.position[2], state.velocity[2]
-    if not reaches(law, z - physics.reach):
+    if not reaches(physics, z - physics.reach):
         return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
     nodes = state.node_offset
     fz = 0.0
     for k in range(nodes.shape[0]):
-        fz += normal_force(law, -(z + nodes[k, 2]), speed, physics.stiffness, physics.damping) - physics.node_weight
+        fz += normal_force(physics, -(z + nodes[k, 2]), speed) - physics.node_weight
     return 0.0, 0.0, fz, 0.0, 0.0, 0.0
 
 

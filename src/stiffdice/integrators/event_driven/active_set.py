@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import normal_of, split, upward
 from stiffdice.dynamics.state import Physics
-from stiffdice.dynamics.vector import Vector, cross, dot, norm, plus, plus_times, row, times
+from stiffdice.dynamics.vector import Vector, assign, cross, dot, norm, plus, plus_times, row, times
 
 # Parts of a motion, 13, and as many more as make it whole vectors of the processor.
 SIZE = 16
@@ -236,10 +236,10 @@ def cross_zero(contact: Contact, motion: Any, switch: int) -> None:
 @njit
 def take(turning: bool, state: Any, motion: Any) -> None:
     """Set a motion to a state's, not turned yet."""
-    motion[:3], motion[3:6], motion[6:9], motion[9:13] = state.position, state.velocity, 0.0, 0.0
-    motion[9] = 1.0
-    if turning:
-        motion[6:9] = state.angular_momentum
+    for axis in range(3):
+        motion[axis], motion[3 + axis] = state.position[axis], state.velocity[axis]
+        motion[6 + axis] = state.angular_momentum[axis] if turning else 0.0
+    assign(motion[9:13], (1.0, 0.0, 0.0, 0.0))
 
 
 @njit

@@ -91,7 +91,8 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
     A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r).
     """
     physics = contact.physics
-    by_speed[:], by_place[:] = 0.0, 0.0
+    by_speed.fill(0.0)
+    by_place.fill(0.0)
     spin, none = spin_of(physics, motion), Vector(0.0, 0.0, 0.0)
     for k in range(NODES):
         if contact.regime.bits[k] & PUSHED == 0:

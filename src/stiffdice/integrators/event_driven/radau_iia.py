@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.vector import assign
 from stiffdice.integrators.event_driven.active_set import NODES, SIZE, Contact, derivative, quaternion_rate
 from stiffdice.integrators.event_driven.held_contact import retouch, slips, slopes, straighten
 from stiffdice.integrators.linear_equations import factorise, solve
@@ -67,7 +68,11 @@ def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[
     slips(contact, start, about[0])
     slopes(contact, start, about[0], by_speed[0], by_place[0])
     for stage in range(1, STAGES):
-        about[stage], by_speed[stage], by_place[stage] = about[0], by_speed[0], by_place[0]
+        for node in range(NODES):
+            assign(about[stage, node], about[0, node])
+        for part in range(6):
+            assign(by_speed[stage, part], by_speed[0, part])
+            assign(by_place[stage, part], by_place[0, part])
     _follow(contact, start, h, change, rates, scale)
     correction, last, iteration, fresh, found = 0.0, 0.0, 0, True, False
     # One that wanders off may find other stages, as smooth and as wrong.

@@ -22,6 +22,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
+from stiffdice.dynamics.vector import assign
 from stiffdice.integrators.event_driven import active_set, dop853, radau_iia
 from stiffdice.integrators.event_driven.active_set import NODES, SIZE, SWITCHES, Contact, derivative, passes
 from stiffdice.integrators.event_driven.touchdown import free_time
@@ -80,15 +81,13 @@ _WORK = np.dtype(
 
 
 @njit
-def part(
-    model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
-) -> tuple[float, int, int]:
+def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int) -> tuple[float, int, int]:
     """Advance `state` by h [s], or by less where that is more work; return what is left [s], evaluations, and the work.
 
     most: about how much work at most, in evaluations; finding touch-downs is work, too.
     """
     # bool() keeps them from being taken for constants, for each of which all would be compiled again.
-    turning, dragging = bool(models.turns(model)), bool(physics.damping > 0.0 and drags(law))
+    turning, dragging = bool(models.turns(model)), bool(physics.damping > 0.0 and drags(physics))
     left, evaluations, work = h, 0, 0
     while left > 0.0 and work < most:
         if not math.isfinite(state.position[2]):
@@ -125,14 +124,15 @@ def _go_through(
     contact: Contact, state: Any, most: float, tolerance: float, effort: int, room: Any
 ) -> tuple[float, int]:
     work = room[0]
-    work.nodes[:] = state.node_offset
-    work.scale[:] = 1.0
+    for node in range(NODES):
+        assign(work.nodes[node], state.node_offset[node])
+    work.scale.fill(1.0)
     active_set.take(contact.turning, state, work.here)
     active_set.vanishing(contact.physics, work.here, work.small)
     active_set.begin(contact, work.here, work.small)
     _look(contact, work, work.here, 0, 0)
     time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
-    while time < most and evaluations < effort and (contact.dragging or np.any(work.bits)):
+    while time < most and evaluations < effort and (contact.dragging or _touches(work)):
         active_set.hardness(contact, work.here, work.hard)
         if h == 0.0:
             h = _first(contact.physics, work, tolerance)
@@ -147,7 +147,7 @@ def _go_through(
             continue
         forced, growth = 0 if error <= 1.0 else forced + 1, _GROWTH
         if forced > _FORCED or not math.isfinite(work.small[1]):
-            work.here[:] = math.nan
+            work.here.fill(math.nan)
             break
         _look(contact, work, work.there, dop853.STAGES, 1)
         lowest = _dip(work, pace)
@@ -176,6 +176,15 @@ def _go_through(
 
 
 @njit
+def _touches(work: Any) -> bool:
+    """Return whether anything acts on a node."""
+    acting = False
+    for node in range(NODES):
+        acting = acting or work.bits[node] != 0
+    return acting
+
+
+@njit
 def _look(contact: Contact, work: Any, motion: Any, stage: int, end: int) -> None:
     """Evaluate rate and switches of the motion at the start of a step (stage 0, end 0) or at its end (the last, 1)."""
     rate = work.stages[stage]
@@ -187,10 +196,10 @@ def _look(contact: Contact, work: Any, motion: Any, stage: int, end: int) -> Non
 def _move_on(work: Any) -> None:
     """Start from where the step ended."""
     active_set.normalise(work.there)
-    work.here[:] = work.there
-    work.stages[0] = work.stages[dop853.STAGES]
-    work.value[0] = work.value[1]
-    work.slope[0] = work.slope[1]
+    assign(work.here, work.there)
+    assign(work.stages[0], work.stages[dop853.STAGES])
+    assign(work.value[0], work.value[1])
+    assign(work.slope[0], work.slope[1])
 
 
 @njit
@@ -209,8 +218,9 @@ def _tolerate(physics: Physics, work: Any, tolerance: float) -> None:
     # What round-off does to a step is no error of it.
     length = max(length, work.small[0])
     pace = max(pace, work.small[0] * hard[0] + 2.0**-49 * speed)
-    scale[:3], scale[3:6] = length, pace
-    scale[6:9], scale[9:13] = pace * physics.inertia / physics.reach, length / physics.reach
+    scale.fill(length / physics.reach)
+    for axis in range(3):
+        scale[axis], scale[3 + axis], scale[6 + axis] = length, pace, pace * physics.inertia / physics.reach
 
 
 @njit

@@ -106,9 +106,7 @@ def unfit(scene: Scene, model: str) -> str | None:
 
 
 @njit
-def part(
-    model: Any, law: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int
-) -> tuple[float, int, int]:
+def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, most: int) -> tuple[float, int, int]:
     """Advance `state` by h [s], or by less in as many pieces as are allowed; return what is left [s], pieces, and work.
 
     most: pieces at most.
@@ -118,7 +116,7 @@ def part(
     pull = fall * normal.z
     height = height_of(physics, state)
     u, along_ground = split(physics, vector(state.velocity))
-    dragging = physics.damping > 0.0 and drags(law)
+    dragging = physics.damping > 0.0 and drags(physics)
     if not dragging and height - physics.reach + min(0.0, h * (u - h * max(0.0, pull) / 2)) > 0.0:
         flight(model, physics, state, h, 1, LAG)
         return 0.0, 1, 1

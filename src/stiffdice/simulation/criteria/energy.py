@@ -95,5 +95,5 @@ def _flying(sight: Any, physics: Physics, state: Any) -> float:
 def _mechanical(sight: Any, system: System, state: Any) -> float:
     """Return kinetic energy + m g z + the springs' [J], the velocity taken at the place."""
     physics, behind = system.physics, sight.lag * sight.step_size
-    moving = energy.kinetic_at_place(system.model, system.law, physics, state, behind)
+    moving = energy.kinetic_at_place(system.model, physics, state, behind)
     return moving + (energy.potential(physics, state) + energy.elastic(physics, state))

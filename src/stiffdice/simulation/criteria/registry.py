@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.state import TURNING, Array
+from stiffdice.dynamics.state import TURNING, Array, Physics
 from stiffdice.errors import InputError
 from stiffdice.simulation import monitor
 from stiffdice.simulation.criteria import apex, energy, finite, restitution, trajectory
@@ -146,7 +146,7 @@ def observe(system: System, member: Member, step: int, flown: int) -> int:
 
 
 @njit(cache=True)
-def finish(system: System, members: Members) -> None:
+def finish(physics: Physics, members: Members) -> None:
     """Let the energy look at the last state of each member."""
     for m in range(len(members.ensemble)):
-        energy.finish(members.memory[m].energy, members.sight[m], system.physics, members.ensemble[m])
+        energy.finish(members.memory[m].energy, members.sight[m], physics, members.ensemble[m])

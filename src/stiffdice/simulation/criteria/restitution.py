@@ -35,7 +35,7 @@ def observe(slots: Any, sight: Any, system: System, state: Any, reference: Any) 
         # An undamped cube goes deepest: its sag twice, and v/ω.
         depth = 2 * sight.sag + sight.speed_in * math.sqrt(physics.mass / 4 / physics.stiffness)
         if depth < free and not math.isnan(slots[0]):
-            out = flat_bounce.rebound_speed(system.law, physics, sight.pull, sight.speed_in)
+            out = flat_bounce.rebound_speed(physics, sight.pull, sight.speed_in)
             slots[0] = max(slots[0], abs(sight.speed_out - out) / sight.speed_in)
         else:
             slots[0] = math.nan

@@ -30,7 +30,6 @@ import numpy.typing as npt
 from scipy.integrate import ode, odeint, solve_ivp
 
 from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.energy import energies
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models.registry import MODELS
@@ -76,10 +75,10 @@ def _put(model: Any, y: Array, room: Any) -> None:
 
 
 @njit
-def _rate(model: Any, law: Any, y: Array, room: Any) -> Array:
+def _rate(model: Any, y: Array, room: Any) -> Array:
     """Return dy/dt: velocity and force over mass; for a turning cube torque, and the quaternion's rate."""
     _put(model, y, room)
-    wrench = models.force(model, law, room.physics, room.state)
+    wrench = models.force(model, room.physics, room.state)
     rate = np.empty(y.shape[0])
     for axis in range(3):
         rate[axis] = y[3 + axis]
@@ -93,24 +92,24 @@ def _rate(model: Any, law: Any, y: Array, room: Any) -> Array:
 
 
 @cache
-def equations(model: str, law: str) -> tuple[Slope, Slopes]:
-    """Return dy/dt and its Jacobian, compiled for one model and contact law: tags to hand over would double the time.
+def equations(model: str) -> tuple[Slope, Slopes]:
+    """Return dy/dt and its Jacobian, compiled for one model: a tag to hand over would double the time.
 
     (t, y, room) -> dy/dt. (t, y, room, sizes) -> its Jacobian by differences, shape (component, component).
     """
-    model_tag, law_tag = MODELS[model], LAWS[law]
+    tag = MODELS[model]
 
     @njit(cache=True)
     def slope(t: float, y: Array, room: Room) -> Array:
-        return _rate(model_tag, law_tag, y, room[0])
+        return _rate(tag, y, room[0])
 
     @njit(cache=True)
     def slopes(t: float, y: Array, room: Room, sizes: Array) -> Array:
         size = y.shape[0]
-        here, there, jacobian = _rate(model_tag, law_tag, y, room[0]), y.copy(), np.empty((size, size))
+        here, there, jacobian = _rate(tag, y, room[0]), y.copy(), np.empty((size, size))
         for j in range(size):
             there[j] = y[j] + _NUDGE * sizes[j]
-            jacobian[:, j] = (_rate(model_tag, law_tag, there, room[0]) - here) / (there[j] - y[j])
+            jacobian[:, j] = (_rate(tag, there, room[0]) - here) / (there[j] - y[j])
             there[j] = y[j]
         return jacobian
 
@@ -145,7 +144,7 @@ class _Solver(Engine):
             parts += [launch["angular_momentum"], [1.0, 0.0, 0.0, 0.0]]
         self._y, self._sizes = np.concatenate(parts), _sizes(self.scene, self.model)
         self._room = room_of(self.scene, self.launch)
-        self._plain, self._slopes = equations(self.model, self.scene.ground.contact)
+        self._plain, self._slopes = equations(self.model)
         # A counter in Python takes a part of the time of an evaluation.
         self._slope: Slope = self._plain if self.most is None else self._counted
         self._evaluations = 0

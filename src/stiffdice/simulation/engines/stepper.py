@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiffdice.dynamics.contact import LAWS
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, States, physics_of, start_of
 from stiffdice.errors import InputError
@@ -125,7 +124,7 @@ class _Scheme(Engine):
     scheme: str = ""
 
     def __post_init__(self) -> None:
-        self._tags = schemes.SCHEMES[self.scheme], MODELS[self.model], LAWS[self.scene.ground.contact]
+        self._tags = schemes.SCHEMES[self.scheme], MODELS[self.model]
         self._physics, self._state = physics_of(self.scene), self.launch.copy()
 
     def advance(self, states: States, every: int) -> int:
