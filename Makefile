@@ -5,7 +5,8 @@ VENV := .venv
 # The folder that the link .venv leads to: what has begun goes on there when a new one takes its place.
 BIN = $(or $(realpath $(VENV)),$(VENV))/bin
 # It takes the place of its shell, and ends with make, however that ends.
-RUN = exec $(BIN)/python workflow/run.py --end-with-parent --cores $(CORES)
+# VERBOSE=1 shows all that Snakemake says.
+RUN = exec $(BIN)/python workflow/run.py --end-with-parent --cores $(CORES) $(if $(VERBOSE),--verbose)
 CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import time
 from collections.abc import Collection, Mapping
 from pathlib import Path
+
+from following import EVERY
 
 from stiffdice.study import eta, forecast, job_log
 from stiffdice.study.config import Study
@@ -56,15 +59,16 @@ class Duration:
 
     def tell(self) -> None:
         """Say at once how long it takes, and from now on what is left, as long as this process lives."""
-        print(f"stiffdice: {self.told()}", file=sys.stderr, flush=True)
+        _say(self.told())
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
         _, seconds = self.left()
+        every = float(os.environ.get(EVERY, "0"))
         while True:
-            time.sleep(min(max(OFTEN, seconds / LINES), SELDOM))
+            time.sleep(every or min(max(OFTEN, seconds / LINES), SELDOM))
             line, seconds = self.left()
-            print(f"stiffdice: {line}", file=sys.stderr, flush=True)
+            _say(line)
 
     def _jobs(self) -> list[Job]:
         return [self._job(folder, result, weight) for (folder, result), weight in self._expected.items()]
@@ -78,3 +82,9 @@ class Duration:
             return eta.job(result, weight, told, due=True, took=None)
         took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
         return eta.job(result, weight, None, due=False, took=took)
+
+
+def _say(line: str) -> None:
+    """Write a line in one piece, as Snakemake writes from other threads."""
+    sys.stderr.write(f"stiffdice: {line}\n")
+    sys.stderr.flush()

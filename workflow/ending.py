@@ -11,6 +11,7 @@ from stiffdice.io import yaml_loader
 from stiffdice.study import job_log
 from stiffdice.study.catalogue import DRAWINGS
 
+FAILED = "what failed in"
 SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
@@ -30,7 +31,7 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
         except StiffdiceError as error:
             failed = f"  {error}"
         if failed:
-            lines += ["", f"what failed in {name}", failed]
+            lines += ["", f"{FAILED} {name}", failed]
     if lines:
         lines += ["", "what does not stand on that is done; the same command goes on from here"]
     return "\n".join([*lines, *_log_of_snakemake(begun, studies)])

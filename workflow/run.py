@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "workflow" / "scripts")]
 
 import ending  # noqa: E402
+import following  # noqa: E402
 import lock  # noqa: E402
 import room  # noqa: E402
 from job import ADDRESS  # noqa: E402
@@ -131,13 +132,19 @@ def warm(environment: dict[str, str], studies: list[str], named: bool) -> Iterat
             process.wait()
 
 
-def rounds(command: list[str], environment: dict[str, str], studies: list[str]) -> int:
-    """Run Snakemake, and again while jobs set damaged results aside, so that these are made; return its exit status."""
+def rounds(command: list[str], environment: dict[str, str], studies: list[str], verbose: bool) -> tuple[int, str]:
+    """Run Snakemake, and again while jobs set damaged results aside, so that these are made.
+
+    verbose: show all that it says. Return its exit status, and what it said at last that was not shown.
+    """
     made_again: dict[str, str] = {}
     for _ in range(ROUNDS):
         begun = time.time()
-        done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=tied)
-        status = done.returncode
+        if verbose:
+            done = subprocess.run(command, cwd=ROOT, env=environment, check=False, preexec_fn=tied)
+            status, withheld = done.returncode, ""
+        else:
+            status, withheld = following.follow(command, ROOT, environment, tied)
         damaged = set_aside_since(begun, studies)
         if status == 0 or not damaged:
             break
@@ -146,7 +153,7 @@ def rounds(command: list[str], environment: dict[str, str], studies: list[str]) 
     if status == 0:
         for path, reason in made_again.items():
             print(printable(f"made again: {path}: {reason}"))
-    return status
+    return status, withheld
 
 
 def main() -> int:
@@ -154,6 +161,7 @@ def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--cores", type=int, required=True)
     parser.add_argument("--end-with-parent", action="store_true", help="be killed with make, which calls this")
+    parser.add_argument("--verbose", action="store_true", help="show all that Snakemake says")
     options, rest = parser.parse_known_args()
     if options.end_with_parent:
         end_with_parent("make")
@@ -174,7 +182,7 @@ def main() -> int:
         print(f"stiffdice: {printable(line)}", file=sys.stderr)
     try:
         with warm(os.environ | changes, studies, named) as environment:
-            status = rounds(command, environment, studies)
+            status, withheld = rounds(command, environment, studies, options.verbose)
     except KeyboardInterrupt:
         print("\nstiffdice: interrupted; the same command goes on from here")
         return 130
@@ -182,7 +190,10 @@ def main() -> int:
         print(f"stiffdice: {printable(reason)}", file=sys.stderr)
     jobs = jobs_since(begun, studies)
     if status:
-        print(ending.told(ROOT, begun, studies), flush=True)
+        failed = ending.told(ROOT, begun, studies)
+        if ending.FAILED not in failed:
+            print(withheld, end="", file=sys.stderr, flush=True)
+        print(failed, flush=True)
         return status
     if jobs:
         print("\nwhere the time went")
