@@ -57,7 +57,7 @@ _PUBLIC = {
     "advise": "stiffdice.advice.recommend:advise",
     "Advice": "stiffdice.advice.result:Advice",
     "Option": "stiffdice.advice.result:Option",
-    "run_advised": "stiffdice.advice.check:run_advised",
+    "run_advised": "stiffdice.advice.result:run_advised",
     # Datasets and files; xarray draws, selects and exports.
     "run_dataset": "stiffdice.simulation.dataset:run_dataset",
     "write_dataset": "stiffdice.io.writer:write_dataset",

@@ -1,6 +1,5 @@
-from stiffdice.advice.check import run_advised
 from stiffdice.advice.recommend import advise
-from stiffdice.advice.result import Advice, Option
+from stiffdice.advice.result import Advice, Option, run_advised
 from stiffdice.errors import InputError, OutputError, StiffdiceError
 from stiffdice.io.reader import open_results
 from stiffdice.io.writer import write_dataset

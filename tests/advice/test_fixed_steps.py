@@ -3,10 +3,9 @@ from __future__ import annotations
 import pytest
 from tests.advice.problems import scene
 
-from stiffdice.advice.check import check, run_advised
 from stiffdice.advice.pilot import SAMPLES, curve, flown, tried
 from stiffdice.advice.recommend import advise
-from stiffdice.advice.result import EXTRAPOLATED, MEASURED
+from stiffdice.advice.result import EXTRAPOLATED, MEASURED, check, run_advised
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,9 @@ import pytest
 from tests.advice.problems import flat, held, resting, scene
 
 from stiffdice.advice import pilot as pilot_module
-from stiffdice.advice.check import check, run_advised
 from stiffdice.advice.pilot import SAMPLES
 from stiffdice.advice.recommend import advise, parsed_error
-from stiffdice.advice.result import MEASURED
+from stiffdice.advice.result import MEASURED, check, run_advised
 from stiffdice.dynamics import linear_theory
 from stiffdice.errors import InputError
 

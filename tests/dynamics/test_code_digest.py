@@ -32,7 +32,7 @@ def digest_of(copy, module):
 
 
 SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.shard", "stiffdice.simulation.dataset"}
-DRAWING = {"stiffdice.report.figures.cube"}
+DRAWING = {"stiffdice.report.figures.runs"}
 COMPARING = {"stiffdice.experiments.work_precision.measure"}
 DRIVING = {"stiffdice.simulation.engines.registry"}
 
@@ -50,8 +50,8 @@ DRIVING = {"stiffdice.simulation.engines.registry"}
         ("simulation/engines/octave.m", COMPARING | DRIVING),
         ("simulation/engines/registry.py", COMPARING | DRIVING),
         ("report/figures/style.py", DRAWING),
-        ("report/figures/cube.py", DRAWING),
-        ("report/figures/stability/stability_limits.py", set()),
+        ("report/figures/runs.py", DRAWING),
+        ("report/figures/stability.py", set()),
         ("cli/main.py", set()),
         ("__init__.py", SIMULATION | DRAWING | COMPARING | DRIVING),
     ],

@@ -12,7 +12,7 @@ from stiffdice.experiments import engines as experiments
 from stiffdice.experiments.engines import OUTCOMES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.writer import write_dataset
-from stiffdice.report.tables import engines
+from stiffdice.report.tables import methods as tables
 from stiffdice.scene.scene import from_mapping
 
 SCENE = from_mapping(
@@ -130,7 +130,7 @@ def test_files_say_of_which_versions_engines_were(limits, contact, speed, tmp_pa
 
 
 def test_limits_are_told_with_how_a_method_fails(limits):
-    told = engines.limits({"limits": limits}, "A title")
+    told = tables.engine_limits({"limits": limits}, "A title")
     rows = {row["method"]: row for row in csv.DictReader(io.StringIO(told.csv))}
     ours, implicit, scipy = (rows[name] for name in ("symplectic euler", "implicit euler", "SciPy LSODA"))
     (at_two,) = (name for name in ours if name.startswith("e at ωh = ") and float(name.split()[-1]) < 3)
@@ -146,13 +146,13 @@ def test_limits_are_told_with_how_a_method_fails(limits):
 
 def test_a_limit_is_the_last_before_the_first_failure():
     omega_h = np.array([0.1, 0.2, 0.4, 0.8])
-    assert engines.limit_of(omega_h, np.array([True, True, False, True])) == (0.2, 0.4)
-    assert str(engines.limit_of(omega_h, np.array([False, True, True, True]))) == "< 0.1"
-    assert str(engines.limit_of(omega_h, np.ones(4, bool))) == "≥ 0.8"
+    assert tables.limit_of(omega_h, np.array([True, True, False, True])) == (0.2, 0.4)
+    assert str(tables.limit_of(omega_h, np.array([False, True, True, True]))) == "< 0.1"
+    assert str(tables.limit_of(omega_h, np.ones(4, bool))) == "≥ 0.8"
 
 
 def test_the_table_of_contacts_has_what_is_off_at_each_step(contact):
-    told = csv.DictReader(io.StringIO(engines.contact({"contact": contact}, "A title").csv))
+    told = csv.DictReader(io.StringIO(tables.engine_contact({"contact": contact}, "A title").csv))
     said = {(row["method"], row["D [kg/s]"]): row["restitution"].split(", ") for row in told}
     assert [abs(float(part.rstrip(" %"))) < 0.1 for part in said["symplectic euler", "0"]] == [True, True]
     shorter, longer = said["implicit euler", "0"]
@@ -160,7 +160,7 @@ def test_the_table_of_contacts_has_what_is_off_at_each_step(contact):
 
 
 def test_the_table_of_speeds_has_ratios_to_ours(speed):
-    told = engines.speed({"speed": speed}, "A title").markdown
+    told = tables.engine_speed({"speed": speed}, "A title").markdown
     ours = next(line for line in told.splitlines() if line.startswith("| symplectic euler"))
     assert ours.count("| 1 |") == 2
     assert "force evaluations" in next(line for line in told.splitlines() if line.startswith("| SciPy"))

@@ -7,7 +7,7 @@ import pytest
 
 from stiffdice.errors import InputError
 from stiffdice.experiments import held_contacts
-from stiffdice.report.figures import held_contacts as drawing
+from stiffdice.report.figures import resting as drawing
 from stiffdice.report.figures import style
 from stiffdice.scene.scene import Scene, from_mapping
 
@@ -37,7 +37,7 @@ def test_a_held_corner_costs_more_and_less_than_by_lsoda(dataset):
 
 def test_a_column_is_drawn_for_each_friction(dataset):
     with style.applied():
-        panels = drawing.draw({"held": dataset}, "A title").axes
+        panels = drawing.held_contacts({"held": dataset}, "A title").axes
     assert len(panels) == 2 * len(FRICTION)
     for f, (upper, lower) in enumerate(zip(panels[: len(FRICTION)], panels[len(FRICTION) :], strict=True)):
         for panel, values in ((upper, dataset.error), (lower, dataset.evaluations)):

@@ -6,8 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from stiffdice.advice.check import Check
-from stiffdice.advice.result import MEASURED, THEORY, Advice, Option
+from stiffdice.advice.result import MEASURED, THEORY, Advice, Check, Option
 from stiffdice.report.advice_page import as_json, as_text, check_as_text, command
 from stiffdice.scene.scene import Scene
 
@@ -105,7 +104,7 @@ def test_where_nothing_keeps_the_error_that_is_said():
 
 
 def test_programs_get_the_same_with_null_for_what_is_no_number():
-    check = Check(run=None, promised=0.001, found=np.inf, against="others")
+    check = Check(promised=0.001, found=np.inf, against="others")
     content = json.loads(as_json(advice(), check))
     assert content["outside"] == ["gravity = 0"]
     assert content["growth_per_landing"] == 4
@@ -114,5 +113,5 @@ def test_programs_get_the_same_with_null_for_what_is_no_number():
 
 
 def test_a_broken_promise_is_told_as_one():
-    assert "NOT KEPT" in check_as_text(Check(run=None, promised=1e-6, found=1e-3, against="others"))
-    assert check_as_text(Check(run=None, promised=1e-6, found=1e-7, against="others")).endswith("others: kept")
+    assert "NOT KEPT" in check_as_text(Check(promised=1e-6, found=1e-3, against="others"))
+    assert check_as_text(Check(promised=1e-6, found=1e-7, against="others")).endswith("others: kept")

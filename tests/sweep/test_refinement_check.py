@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stiffdice.errors import InputError
-from stiffdice.report.tables.refinement_check import table
+from stiffdice.report.tables.sweeps import refinement_check as table
 from stiffdice.sweep import refinement_check, stability_limits
 from stiffdice.sweep.refinement_check import BINS, Scan
 from stiffdice.sweep.stability_limits import edges

@@ -278,7 +278,7 @@ def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
 
 @pytest.mark.long
 def test_a_changed_drawing_draws_its_figure_only(finished, edited):
-    edited("src/stiffdice/report/figures/energy_budget.py", lambda text: text + "\n")
+    edited("src/stiffdice/report/figures/bounces.py", lambda text: text + "\n")
     assert finished.jobs_due() == {"figure": 1}
 
 

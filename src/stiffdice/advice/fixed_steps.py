@@ -12,7 +12,6 @@ import itertools
 import math
 import statistics
 import time
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +61,11 @@ class Search(NamedTuple):
     def option(self, scheme: str, error: float) -> Option:
         """Return how many steps of a scheme an error [radii] takes."""
         pilot, runs, keeping = self.pilot, list[tuple[Trial, Array]](), 0
-        for steps in self._ladder(scheme):
+        # From where the scheme is stable on, twice as many steps every time.
+        limit = linear_stability.stability_limit(scheme, self.hardest.zeta)
+        longest = min(1.0, 0.9 * limit) if limit > 0.1 else 1.0
+        steps = SAMPLES * max(1, math.ceil(self.hardest.omega * pilot.scene.duration / longest / SAMPLES))
+        while steps <= _MOST_STEPS:
             trial = tried(pilot.scene, pilot.model, scheme, steps, budget=self.budget)
             off = pilot.error(trial)
             runs.append((trial, off))
@@ -70,6 +73,7 @@ class Search(NamedTuple):
             # One that keeps it might be lucky.
             if keeping == 2 or trial.computed >= self.budget or (keeping == 0 and steps > _MOST_STEPS / 4):
                 break
+            steps *= 2
         if keeping < 2:
             return self._extrapolated(runs, error)
         trial, off = runs[-2]
@@ -79,21 +83,16 @@ class Search(NamedTuple):
         )
         return self._option(trial, trial.steps, max(float(off[-1]), float(pilot.floor[-1])), MEASURED, error, evidence)
 
-    def _ladder(self, scheme: str) -> Iterator[int]:
-        """Yield steps, twice as many every time, from where the scheme is stable on."""
-        limit = linear_stability.stability_limit(scheme, self.hardest.zeta)
-        longest = min(1.0, 0.9 * limit) if limit > 0.1 else 1.0
-        steps = SAMPLES * max(1, math.ceil(self.hardest.omega * self.pilot.scene.duration / longest / SAMPLES))
-        while steps <= _MOST_STEPS:
-            yield steps
-            steps *= 2
-
     def _extrapolated(self, runs: list[tuple[Trial, Array]], asked: float) -> Option:
         known, last = self._known(runs), runs[-1][0]
         if not known:
             evidence = "no run within the budget says how far off it is; more steps than these, by its stability limit"
             return self._option(last, last.steps, None, THEORY, asked, evidence)
-        order = self._order(last.scheme, [end for _, end in known])
+        # Of second order only where the last runs of such a scheme show it.
+        ground, pairs = self.pilot.scene.ground, itertools.pairwise(end for _, end in known)
+        smooth = last.scheme in _SECOND_ORDER and ground.damping == 0 and ground.friction == 0
+        shown = len(known) == _RUNGS and all(a / b > _SECOND for a, b in pairs if b > 0)
+        order = 2 if smooth and shown else 1
         worst = max(end * float(trial.steps) ** order for trial, end in known)
         wanted = (_FAR_SAFETY * worst / asked) ** (1 / order)
         evidence = (
@@ -106,46 +105,36 @@ class Search(NamedTuple):
         steps = SAMPLES * math.ceil(max(wanted, last.steps) / SAMPLES)
         return self._option(last, steps, worst / float(steps) ** order, EXTRAPOLATED, asked, evidence)
 
-    def _order(self, scheme: str, errors: list[float]) -> int:
-        """Return the order to extrapolate by: two only for a scheme of second order, where the last runs show it."""
-        ground = self.pilot.scene.ground
-        if scheme not in _SECOND_ORDER or ground.damping > 0 or ground.friction > 0:
-            return 1
-        shown = all(a / b > _SECOND for a, b in itertools.pairwise(errors) if b > 0)
-        return 2 if len(errors) == _RUNGS and shown else 1
-
     def _known(self, runs: list[tuple[Trial, Array]]) -> list[tuple[Trial, float]]:
         """Return some runs with their errors at the end [radii], by their steps.
 
         They are the finest of those that are known to the end; if there is none, of those that are known longest.
         """
-        grown = [(trial, self._grown(off)) for trial, off in runs]
-        known = [(trial, *found) for trial, found in grown if found is not None]
-        whole = [each for each in known if each[1] == SAMPLES]
-        longest = whole or sorted(known, key=lambda each: (each[1], each[0].steps))
-        return sorted(((trial, end) for trial, _, end in longest[-_RUNGS:]), key=lambda each: each[0].steps)
-
-    def _grown(self, off: Array) -> tuple[int, float] | None:
-        """Return until which sample a run is known, and its error at the end [radii]; None if it says nothing."""
-        small = np.flatnonzero((off <= LINEAR) & (off > 0) & (self.shape > 0))
-        if not small.size:
-            return None
-        last = int(small[-1])
-        if last == SAMPLES:
-            return last, float(off[-1])
-        landed = self.pilot.landings
-        # Until the second landing a chaotic motion has not shown how errors grow.
-        if len(landed) and last <= landed[0]:
-            return None
-        # What a scheme does to every bounce adds up in the speed, and so twice in the place, where nothing is chaotic.
-        grown = float(off[last] * max((SAMPLES / last) ** 2, self.shape[-1] / self.shape[last]))
-        return (last, grown) if math.isfinite(grown) else None
+        known = []
+        for trial, off in runs:
+            small = np.flatnonzero((off <= LINEAR) & (off > 0) & (self.shape > 0))
+            last = int(small[-1]) if small.size else 0
+            # Until the second landing a chaotic motion has not shown how errors grow.
+            if last == 0 or (last < SAMPLES and last <= min(self.pilot.landings, default=0)):
+                continue
+            # What a scheme does to every bounce adds up in the speed, and so twice in the place, without any chaos.
+            growth = max((SAMPLES / last) ** 2, self.shape[-1] / self.shape[last]) if last < SAMPLES else 1.0
+            if math.isfinite(end := float(off[last] * growth)):
+                known.append((last, trial, end))
+        whole = [each for each in known if each[0] == SAMPLES]
+        longest = whole or sorted(known, key=lambda each: (each[0], each[1].steps))
+        return sorted(((trial, end) for _, trial, end in longest[-_RUNGS:]), key=lambda each: each[0].steps)
 
     def _option(
         self, trial: Trial, steps: float, error: float | None, basis: str, asked: float, evidence: str
     ) -> Option:
         """Return an option of a trial's scheme, which tells how long a step takes; error [radii]: expected."""
-        pilot, counted = self.pilot, steps < _MOST_STEPS
+        pilot, counted, took = self.pilot, steps < _MOST_STEPS, []
+        for _ in range(3):  # of plain stepping
+            begun, scheme, many = time.perf_counter(), trial.scheme, trial.steps
+            every = many // SAMPLES
+            run = simulate(pilot.scene, model=pilot.model, scheme=scheme, steps=many, every=every, budget=_TIMED)
+            took.append((time.perf_counter() - begun) / max(1, int(run.steps_computed[0])))
         # Half a unit of the place in each step, all in one direction.
         rounding = steps * 2.0**-53 * float(np.nanmax(np.abs(pilot.best.places))) / pilot.scene.cube.radius
         if counted and error is not None and rounding > asked:
@@ -157,18 +146,9 @@ class Search(NamedTuple):
             error=error,
             basis=basis,
             evaluations=trial.evaluations / max(1, trial.computed) * steps,
-            seconds=steps * self._seconds_per_step(trial),
+            seconds=steps * statistics.median(took),
             omega_h=self.hardest.omega * pilot.scene.duration / steps,
             limit=linear_stability.stability_limit(trial.scheme, self.hardest.zeta),
             keeps=counted and error is not None and max(rounding, float(pilot.floor[-1])) <= asked,
             evidence=evidence,
         )
-
-    def _seconds_per_step(self, trial: Trial) -> float:
-        """Return how long a step takes [s], of plain stepping: the median of three runs."""
-        scene, model, steps, took = self.pilot.scene, self.pilot.model, trial.steps, []
-        for _ in range(3):
-            begun = time.perf_counter()
-            run = simulate(scene, model=model, scheme=trial.scheme, steps=steps, every=steps // SAMPLES, budget=_TIMED)
-            took.append((time.perf_counter() - begun) / max(1, int(run.steps_computed[0])))
-        return statistics.median(took)

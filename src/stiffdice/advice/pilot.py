@@ -54,10 +54,7 @@ _OTHERS = {"exact": ("event", OURS, "event"), "event": ("SciPy's LSODA", "scipy"
 
 
 class TooSlowError(Exception):
-    """A run takes too long; fraction: of it that was done."""
-
-    def __init__(self, fraction: float) -> None:
-        self.fraction = fraction
+    """A run takes too long; its argument is the fraction of it that was done."""
 
 
 @dataclass(frozen=True)
@@ -146,17 +143,10 @@ def tried(
         progress=fractions.append,
     )
     seconds = time.perf_counter() - begun
+    counts = int(run.evaluations[0]), int(run.steps_computed[0])
     whole = run.steps_done[0] == steps or run.measures["out_of_range"][0] > 0
-    return Trial(
-        run.scheme,
-        steps,
-        tolerance,
-        states_of(run, SAMPLES)["position"],
-        int(run.evaluations[0]),
-        int(run.steps_computed[0]),
-        seconds,
-        1.0 if whole else fractions[-1],
-    )
+    fraction = 1.0 if whole else fractions[-1]
+    return Trial(run.scheme, steps, tolerance, states_of(run, SAMPLES)["position"], *counts, seconds, fraction)
 
 
 def flown(scene: Scene, patience: int = PATIENCE) -> Pilot:

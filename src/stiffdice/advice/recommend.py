@@ -30,6 +30,9 @@ _WORTH = 0.5
 # A run that takes longer [s] is timed once; a scene that takes more force evaluations is tried at fewer tolerances.
 _SLOW, _DEAR = 0.3, 1_000_000
 
+# Schemes that take steps of their own, so that the advised run is one that was made.
+_OWN = ("exact", "event")
+
 # What the advice was tried on (docs/advice.md): stiffness for the paper's cube, and damping ratio of a flat landing.
 STUDIED_STIFFNESS = 1e2, 1e12
 STUDIED_ZETA = 0.5
@@ -82,15 +85,17 @@ def advise(
         schemes.check_fit(scheme, pilot.scene, pilot.model)
     tell("event")
     ladder = [] if scheme == "exact" else _ladder(pilot, patience)
-    search = Search(pilot, linear_stability.hardest(pilot.scene, pilot.model), _shape(pilot, ladder), budget)
-    special = {"exact": lambda: _exact(pilot, error), "event": lambda: _event(pilot, ladder, error, patience)}
+    small = [off for _, off in ladder if pilot.floor[-1] < off[-1] <= LINEAR]
+    shape = max(small, key=lambda off: off[-1], default=pilot.floor)  # the largest error that grows as small ones do
+    search = Search(pilot, linear_stability.hardest(pilot.scene, pilot.model), shape, budget)
     options = []
     for name in schemes.SCHEMES if scheme is None else [scheme]:
         if not schemes.unfit(name, pilot.scene, pilot.model):
             tell(name)
-            options.append(special[name]() if name in special else search.option(name, error))
+            options.append(_own(pilot, name, ladder, error, patience) if name in _OWN else search.option(name, error))
     options.sort(key=lambda option: (not option.keeps, option.seconds))
     best = _best(options)
+    start, end = float(shape[pilot.landings[1]]) if len(pilot.landings) > 1 else 0.0, float(shape[-1])
     return Advice(
         scene=pilot.scene,
         asked=error,
@@ -104,7 +109,7 @@ def advise(
         floor=float(pilot.floor[-1]),
         paths=(pilot.best,) if pilot.other is None else (pilot.best, pilot.other),
         landings=len(pilot.landings),
-        growth=_growth(pilot, search.shape),
+        growth=max(1.0, end / start) if start > 0 and math.isfinite(end) else None,
         mode=search.hardest.mode,
         outside=tuple(_outside(pilot, best)),
     )
@@ -118,7 +123,7 @@ def _known(scene: Scene, error: float, patience: int) -> tuple[Pilot, str]:
             pilot = flown(scene, patience)
         except TooSlowError as out:
             # A little shorter, as its twins take longer.
-            shorter = _rounded_down(0.8 * out.fraction * scene.duration)
+            shorter = _rounded_down(0.8 * out.args[0] * scene.duration)
             cut = cut or f"a pilot run to t = {scene.duration:g} s takes more than {patience:,} force evaluations"
         else:
             last = int(np.flatnonzero(pilot.floor <= error).max(initial=0))
@@ -191,19 +196,11 @@ def _ladder(pilot: Pilot, patience: int) -> list[tuple[Trial, Array]]:
     return [(trial, pilot.error(trial)) for trial in trials]
 
 
-def _shape(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]]) -> Array:
-    """Return how a small error grows, shape (SAMPLES + 1,), up to a factor: the largest of the ladder's that is."""
-    small = [off for _, off in ladder if pilot.floor[-1] < off[-1] <= LINEAR]
-    return max(small, key=lambda off: off[-1]) if small else pilot.floor
-
-
-def _exact(pilot: Pilot, error: float) -> Option:
-    evidence = f"it is exact but for round-off, which {pilot.borne_out}"
-    return _made_again(pilot, pilot.best, None, float(pilot.floor[-1]), error, evidence)
-
-
-def _event(pilot: Pilot, ladder: Sequence[tuple[Trial, Array]], error: float, patience: int) -> Option:
-    """Return the cheapest tolerance from which on all finer ones keep an error."""
+def _own(pilot: Pilot, scheme: str, ladder: Sequence[tuple[Trial, Array]], error: float, patience: int) -> Option:
+    """Return `exact`, or the cheapest tolerance of `event` from which on all finer ones keep an error."""
+    if scheme == "exact":
+        evidence = f"it is exact but for round-off, which {pilot.borne_out}"
+        return _made_again(pilot, pilot.best, None, float(pilot.floor[-1]), error, evidence)
     if not ladder:
         trial = tried(pilot.scene, pilot.model, "event", SAMPLES, schemes.FINEST, budget=patience)
         evidence = (
@@ -243,14 +240,6 @@ def _made_again(
         keeps=expected is not None and expected <= error,
         evidence=evidence,
     )
-
-
-def _growth(pilot: Pilot, shape: Array) -> float | None:
-    """Return by how much an error grows from the second landing to the end; a first one is needed to make it."""
-    if len(pilot.landings) < 2:
-        return None
-    start = float(shape[min(SAMPLES, int(pilot.landings[1]))])
-    return max(1.0, float(shape[-1]) / start) if start > 0 and math.isfinite(float(shape[-1])) else None
 
 
 def _outside(pilot: Pilot, best: Option | None) -> Iterator[str]:

@@ -99,8 +99,8 @@ def call(options: argparse.Namespace) -> int:
 
     # These take about a second to import; bad input is told before.
     from stiffdice.advice import recommend
-    from stiffdice.advice.check import check as checked
-    from stiffdice.advice.check import run_advised
+    from stiffdice.advice.result import check as checked
+    from stiffdice.advice.result import run_advised
     from stiffdice.cli.progress import notes, progress
     from stiffdice.report import advice_page
     from stiffdice.simulation.outcome import Verdict

@@ -9,9 +9,8 @@ import shlex
 from collections.abc import Sequence
 from typing import Any
 
-from stiffdice.advice.check import Check
 from stiffdice.advice.pilot import SAMPLES
-from stiffdice.advice.result import Advice, Option
+from stiffdice.advice.result import Advice, Check, Option
 from stiffdice.errors import printable
 from stiffdice.report.markdown_table import aligned
 from stiffdice.report.number_format import duration, finite, readable
@@ -24,7 +23,12 @@ def as_text(advice: Advice, arguments: Sequence[str]) -> str:
     arguments: of `stiffdice run` that name the scene, to show a command; without any none is shown.
     """
     best = advice.best
-    rows = [("model", advice.model_reason), *(_none_found(advice) if best is None else _advised(advice, best))]
+    rows = [("model", advice.model_reason)]
+    if best is None:
+        until = f"none found that keeps {advice.asked:.3g} radii until t = {advice.horizon:g} s"
+        rows += [("scheme", until), ("floor", f"the path itself is known to {_short(advice.floor)} radii")]
+    else:
+        rows += _advised(advice, best)
     if advice.cut:
         rows.append(("until", f"t = {advice.horizon:g} s of {advice.duration:g} s: {advice.cut}"))
     if advice.growth is not None and advice.growth_per_landing is not None:
@@ -45,40 +49,22 @@ def _rows(rows: Sequence[tuple[str, str]]) -> list[str]:
     return [f"{label:10}{text}" for label, text in rows]
 
 
-def _none_found(advice: Advice) -> list[tuple[str, str]]:
-    return [
-        ("scheme", f"none found that keeps {advice.asked:.3g} radii until t = {advice.horizon:g} s"),
-        ("floor", f"the path itself is known to {_short(advice.floor)} radii"),
-    ]
-
-
 def _advised(advice: Advice, best: Option) -> list[tuple[str, str]]:
-    how = f"{best.steps:,} steps"
+    how, margin = f"{best.steps:,} steps", "none needed: nothing touches"
     if best.omega_h is None:
         tolerance = "" if best.tolerance is None else f"tolerance {best.tolerance:.0e}, "
         how = f"{tolerance}{best.steps:,} output intervals"
+        margin = f"none needed: {best.scheme} takes steps of its own and has no stability limit"
+    elif best.margin is not None and best.limit is not None:
+        limit = "stable at any step" if math.isinf(best.limit) else f"stability limit ωh = {best.limit:.3g}"
+        margin = f"{_short(best.margin)} times: ωh = {best.omega_h:.2g} ({advice.mode}), {limit}"
     error = (
         f"about {_short(best.error)} radii, {advice.asked:.3g} asked: root mean square distance of the centre from the "
         f"exact path until t = {advice.horizon:g} s"
     )
     what = "pieces in closed form" if best.scheme == "exact" else "force evaluations"
     run_time = f"about {duration(best.seconds, 2)}, measured on this machine; {_short(best.evaluations)} {what}"
-    return [
-        ("scheme", f"{best.scheme}, {how}"),
-        ("error", error),
-        ("run time", run_time),
-        ("margin", _margin(best, advice.mode)),
-    ]
-
-
-def _margin(option: Option, mode: str) -> str:
-    """Return how far the steps are from the limit of stability."""
-    if option.omega_h is None:
-        return f"none needed: {option.scheme} takes steps of its own and has no stability limit"
-    if option.margin is None or option.limit is None:
-        return "none needed: nothing touches"
-    limit = "stable at any step" if math.isinf(option.limit) else f"stability limit ωh = {option.limit:.3g}"
-    return f"{_short(option.margin)} times: ωh = {option.omega_h:.2g} ({mode}), {limit}"
+    return [("scheme", f"{best.scheme}, {how}"), ("error", error), ("run time", run_time), ("margin", margin)]
 
 
 def _cells(option: Option, base: float) -> Sequence[str]:
@@ -152,6 +138,6 @@ def _plain(value: Any) -> Any:
         return [_plain(part) for part in value]
     if isinstance(value, (Advice, Option, Check)):
         derived = [name for name, part in vars(type(value)).items() if isinstance(part, property)]
-        names = [field.name for field in dataclasses.fields(value) if field.name not in ("run", "paths")]
+        names = [field.name for field in dataclasses.fields(value) if field.name != "paths"]
         return {_KEYS.get(name, name): _plain(getattr(value, name)) for name in [*names, *derived]}
     return finite(value) if isinstance(value, float) else value

@@ -40,7 +40,11 @@ def as_text(dataset: xr.Dataset, name: str) -> str:
         name in dataset and dataset[name].dims == ("bounce",) for name in _OF_BOUNCES
     ):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
-    lines += ["", "variables", *_variables(dataset)]
+    rows = []
+    for key, variable in dataset.variables.items():
+        sizes = " × ".join(f"{size} {dim}" for dim, size in variable.sizes.items()) or "one value"
+        rows.append((str(key), sizes, f"[{variable.attrs.get('units', '?')}]", variable.attrs.get("long_name", "")))
+    lines += ["", "variables", *aligned(rows)]
     return "\n".join(map(printable, lines))
 
 
@@ -57,19 +61,14 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
     if total > 1:
         return [f"  {name}: {count} of {total} runs ({count / total:.1%})" for name, count in counts.items()]
     (name,) = counts
-    measures = [
-        _measured(str(name), variable)
-        for name, variable in dataset.data_vars.items()
-        if variable.ndim == 0 and str(name).endswith(("_ratio", "_error", "_phase"))
-    ]
+    measures = []
+    for measure, variable in dataset.data_vars.items():
+        if variable.ndim == 0 and str(measure).endswith(("_ratio", "_error", "_phase")):
+            found = f" = {float(variable):.6g}: {variable.attrs['long_name']}"
+            none = measure == "apex_ratio" and not float(variable)
+            measures.append(f"  {measure}{': no rebound to compare with the one before' if none else found}")
     # A later version may have verdicts of other names.
     return [f"  {Verdict[name.upper()].sentence if name.upper() in Verdict.__members__ else name}", *measures]
-
-
-def _measured(name: str, variable: xr.DataArray) -> str:
-    if name == "apex_ratio" and not float(variable):
-        return f"  {name}: no rebound to compare with the one before"
-    return f"  {name} = {float(variable):.6g}: {variable.attrs['long_name']}"
 
 
 def _ledger(dataset: xr.Dataset) -> list[str]:
@@ -97,14 +96,6 @@ def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
     else:
         return {}
     return {name: int(count) for name, count in zip(names, counts, strict=True) if count}
-
-
-def _variables(dataset: xr.Dataset) -> list[str]:
-    rows = []
-    for name, variable in dataset.variables.items():
-        sizes = " × ".join(f"{size} {dim}" for dim, size in variable.sizes.items()) or "one value"
-        rows.append((str(name), sizes, f"[{variable.attrs.get('units', '?')}]", variable.attrs.get("long_name", "")))
-    return aligned(rows)
 
 
 def as_json(dataset: xr.Dataset) -> str:

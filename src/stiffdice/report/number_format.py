@@ -10,8 +10,6 @@ import xarray as xr
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GROUND = {"stiffness": "S = {} kg/s²", "damping": "D = {} kg/s", "friction": "μ = {}"}
-
-
 _TIMES = {"years": 365.25 * 86400, "days": 86400, "h": 3600, "min": 60, "s": 1, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 
 

@@ -25,7 +25,20 @@ def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
 
     scheme: an engine's own has no limit that is known here. Raises InputError for a model that does not fit the scene.
     """
-    said = [*_of_density(scene), *_of_start(scene, model)]
+    said = []
+    density = scene.cube.mass / scene.cube.side / scene.cube.side / scene.cube.side
+    if not _DENSITIES[0] <= density <= _DENSITIES[1]:
+        size = f"{scene.cube.side:g} m of side, {scene.cube.mass:g} kg"
+        said.append(f"the cube has a density of {density:.2g} kg/m³ ({size}); the units are m and kg")
+    start = start_of(scene, model)[0]
+    heights = along(start["position"] + start["node_offset"], scene.ground.normal)
+    depth = -float(heights.min())
+    if depth > 2 * min(linear_theory.sag(scene), scene.cube.side):  # more than it sinks in at rest
+        stored = 0.5 * scene.ground.stiffness * float((np.minimum(heights, 0.0) ** 2).sum())
+        said.append(
+            f"launch.position: the cube starts in the ground, its lowest node {depth:.3g} m deep; "
+            f"the springs hold {stored:.3g} J and throw it out"
+        )
     turn = float(linear_stability.half_turn_steps(scene, np.array(scene.launch.spin)))
     if model in TURNING & TOUCHING and steps < turn and scheme not in schemes.OWN_STEPS:
         said.append(
@@ -34,14 +47,11 @@ def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
         )
     fewest = max(linear_stability.fewest_steps(scene, model, scheme)) if scheme in schemes.SCHEMES else 0.0
     if steps < fewest:
-        said.append(f"{steps:,} steps are beyond the limit of linear stability: {_needed(scheme, fewest)}")
+        needed = f"{scheme} needs {_rounded_up(fewest)} or more"
+        none = f"{scheme} has none on this ground; symplectic_euler or event has"
+        limit = none if math.isinf(fewest) else needed
+        said.append(f"{steps:,} steps are beyond the limit of linear stability: {limit}")
     return said
-
-
-def _needed(scheme: str, fewest: float) -> str:
-    if math.isinf(fewest):
-        return f"{scheme} has none on this ground; symplectic_euler or event has"
-    return f"{scheme} needs {_rounded_up(fewest)} or more"
 
 
 def _rounded_up(steps: float) -> str:
@@ -52,47 +62,22 @@ def _rounded_up(steps: float) -> str:
     return f"{math.ceil(steps / unit) * unit:,.0f}"
 
 
-def _of_density(scene: Scene) -> list[str]:
-    density = scene.cube.mass / scene.cube.side / scene.cube.side / scene.cube.side
-    if _DENSITIES[0] <= density <= _DENSITIES[1]:
-        return []
-    size = f"{scene.cube.side:g} m of side, {scene.cube.mass:g} kg"
-    return [f"the cube has a density of {density:.2g} kg/m³ ({size}); the units are m and kg"]
-
-
-def _of_start(scene: Scene, model: str) -> list[str]:
-    """Say by how much the cube starts below the ground, if that is more than it sinks in at rest."""
-    start = start_of(scene, model)[0]
-    heights = along(start["position"] + start["node_offset"], scene.ground.normal)
-    depth = -float(heights.min())
-    if not depth > 2 * min(linear_theory.sag(scene), scene.cube.side):
-        return []
-    stored = 0.5 * scene.ground.stiffness * float((np.minimum(heights, 0.0) ** 2).sum())
-    return [
-        f"launch.position: the cube starts in the ground, its lowest node {depth:.3g} m deep; "
-        f"the springs hold {stored:.3g} J and throw it out"
-    ]
-
-
 def lines(run: Run, name: str, advise: str) -> list[str]:
     """Return how a run of one member ended, and what that was looked at by.
 
     name: of its file. advise: the command that tells how accurate such a run is.
     """
-    verdict = Verdict(run.verdict[0])
-    said = [f"{name}: {verdict.sentence}", *(_looked_at(run, criterion) for criterion in run.tolerances)]
+    said = [f"{name}: {Verdict(run.verdict[0]).sentence}"]
+    for criterion, tolerance in run.tolerances.items():
+        part = CRITERIA[criterion]
+        measure = float(run.measures[part.MEASURE][0])
+        found = f"{measure:.6g}, allowed {part.BASE + tolerance:g}: {part.LONG_NAME}"
+        none = criterion == "apex" and measure == 0
+        said.append(f"  {criterion:9} {'no rebound to compare with the one before' if none else found}")
     said.append(f"  steps     {_steps(run)}")
     if run.simulator == OURS:
         said.append(f"  accuracy  was not looked at; this does: {advise}")
     return said
-
-
-def _looked_at(run: Run, criterion: str) -> str:
-    part, tolerance = CRITERIA[criterion], run.tolerances[criterion]
-    measure = float(run.measures[part.MEASURE][0])
-    if criterion == "apex" and measure == 0:
-        return f"  {criterion:9} no rebound to compare with the one before"
-    return f"  {criterion:9} {measure:.6g}, allowed {part.BASE + tolerance:g}: {part.LONG_NAME}"
 
 
 def _steps(run: Run) -> str:

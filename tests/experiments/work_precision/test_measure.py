@@ -10,7 +10,7 @@ from stiffdice.experiments.work_precision import measure as work_precision
 from stiffdice.experiments.work_precision.problems import MEASURES, SAMPLES
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.io.writer import write_dataset
-from stiffdice.report.tables import work_precision as tradeoff
+from stiffdice.report.tables import methods as tradeoff
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines.registry import SOLVERS
 
@@ -149,7 +149,7 @@ def test_no_step_and_no_run_of_a_peer_is_faster_than_any_processor(timed):
 
 
 def test_the_tables_tell_who_is_cheapest(flat, timed):
-    table = tradeoff.table({"flat": flat, "timed": timed}, "A title")
+    table = tradeoff.work_precision({"flat": flat, "timed": timed}, "A title")
     rows = [row.split("|")[1:-1] for row in table.markdown.splitlines()[4:10]]
     assert len(rows) == 2 * 3
     assert "symplectic euler" in rows[0][3]

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 from tests.report.figures.drawing import check_equal_files, check_units, drawn, lines_of
 
-from stiffdice.report.figures import cube, style
 from stiffdice.report.figures import registry as figures
+from stiffdice.report.figures import runs, style
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
@@ -63,7 +63,7 @@ def test_the_animation_runs_in_real_time(data, tmp_path):
 def test_the_animation_shows_the_cube_where_it_is(data):
     run = data["cube"]["as_listed"]
     with style.applied():
-        animation = cube.animation(data["cube"], "The throw")
+        animation = runs.animation(data["cube"], "The throw")
         edges, trace, clock = animation.show(39)
     assert clock.get_text() == "t =  2.0 s"
     assert trace.get_data_3d()[2][-1] == run.position[-1, 2]

@@ -110,7 +110,7 @@ def test_scipy_is_imported_by_its_peers_only_and_these_by_whom_they_are_asked_fo
     named = {path.name for path in PACKAGE.rglob("*.py") if asking.search(path.read_text())}
     assert named == {"scipy_ivp.py"}
     code = (
-        "import sys, stiffdice.experiments.work_precision.measure, stiffdice.report.tables.work_precision; "
+        "import sys, stiffdice.experiments.work_precision.measure, stiffdice.report.tables.methods; "
         "sys.exit('stiffdice.simulation.engines.scipy_ivp' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

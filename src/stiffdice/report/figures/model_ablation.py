@@ -100,7 +100,20 @@ def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     figure = style.new_figure(title, width=4.6 * len(timings) + 1.4, height=5.4)
     panels = figure.subplots(1, len(timings), sharex=True, sharey=True, squeeze=False)[0]
     for panel, dataset in zip(panels, timings.values(), strict=True):
-        _bars(panel, dataset)
+        for k, (kind, (_, color)) in enumerate(_KINDS.items()):
+            ratios = dataset[f"{kind}_ratio"].values
+            places = np.arange(len(ratios)) + 0.27 * (k - 1)
+            panel.barh(places, np.nan_to_num(ratios, nan=1.0) - 1, left=1.0, height=0.24, color=color)
+            for place, ratio, (full, least) in zip(places, ratios, dataset[f"{kind}_time"].values, strict=True):
+                if np.isfinite(ratio):
+                    text = f" {ratio:.3g}×: {duration(full)} / {duration(least)}"
+                    panel.text(max(1.0, ratio), place, text, va="center", fontsize=7.5)
+        panel.axvline(1.0, color=style.INK, linewidth=0.8)
+        most = float(np.nanmax([dataset[f"{kind}_ratio"] for kind in _KINDS]))
+        panel.set(xscale="log", xlim=(0.6, 40 * max(4.0, most)), xlabel="time with the piece over time without it [1]")
+        panel.xaxis.set_major_formatter(ScalarFormatter())
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.grid(visible=False, axis="y")
         law = scene_of(dataset)["ground"]["contact"]
         panel.set_title(f"{style.LAW_NAMES[law]}: unneeded")
     pieces = meanings_of(next(iter(timings.values())).piece)
@@ -109,21 +122,3 @@ def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     handles = [style.line(text, color=color, linewidth=6) for text, color in _KINDS.values()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
-
-
-def _bars(panel: Any, dataset: xr.Dataset) -> None:
-    for k, (kind, (_, color)) in enumerate(_KINDS.items()):
-        ratios = dataset[f"{kind}_ratio"].values
-        seconds = dataset[f"{kind}_time"].values
-        places = np.arange(len(ratios)) + 0.27 * (k - 1)
-        panel.barh(places, np.nan_to_num(ratios, nan=1.0) - 1, left=1.0, height=0.24, color=color)
-        for place, ratio, (full, least) in zip(places, ratios, seconds, strict=True):
-            if np.isfinite(ratio):
-                text = f" {ratio:.3g}×: {duration(full)} / {duration(least)}"
-                panel.text(max(1.0, ratio), place, text, va="center", fontsize=7.5)
-    panel.axvline(1.0, color=style.INK, linewidth=0.8)
-    most = float(np.nanmax([dataset[f"{kind}_ratio"] for kind in _KINDS]))
-    panel.set(xscale="log", xlim=(0.6, 40 * max(4.0, most)), xlabel="time with the piece over time without it [1]")
-    panel.xaxis.set_major_formatter(ScalarFormatter())
-    panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.grid(visible=False, axis="y")

@@ -21,6 +21,7 @@ from stiffdice.study.catalogue import DRAWINGS
 # Of an animation; 50 ms a frame, because a GIF counts in hundredths of a second.
 FRAMES_PER_SECOND = 20
 COLOURS = 64  # of all frames together
+_METADATA = {"svg": {"Date": None, "Creator": "stiffdice"}, "png": {"Software": "stiffdice"}}
 
 
 class Animation(NamedTuple):
@@ -39,20 +40,17 @@ def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, pat
     with style.applied():
         figure = DRAWINGS[drawing].load()(data, title)
         for path in paths:
-            write_bytes(_encoded(figure, Path(path).suffix[1:], dpi), path)
+            stream = io.BytesIO()
+            if isinstance(figure, Animation):
+                _draw_gif(figure, dpi, stream)
+            else:
+                kind = Path(path).suffix[1:]
+                figure.savefig(stream, format=kind, dpi=dpi, metadata=_METADATA[kind])
+            write_bytes(stream.getvalue(), path)
 
 
-def _encoded(figure: Figure | Animation, kind: str, dpi: int) -> bytes:
-    if isinstance(figure, Animation):
-        return _gif(figure, dpi)
-    stream = io.BytesIO()
-    metadata = {"svg": {"Date": None, "Creator": "stiffdice"}, "png": {"Software": "stiffdice"}}[kind]
-    figure.savefig(stream, format=kind, dpi=dpi, metadata=metadata)
-    return stream.getvalue()
-
-
-def _gif(animation: Animation, dpi: int) -> bytes:
-    """Return a GIF of frames for which what does not move is drawn once."""
+def _draw_gif(animation: Animation, dpi: int, stream: io.BytesIO) -> None:
+    """Draw a GIF of frames for which what does not move is drawn once."""
     figure = animation.figure
     figure.set_dpi(dpi)
     canvas: Any = FigureCanvasAgg(figure)
@@ -69,7 +67,5 @@ def _gif(animation: Animation, dpi: int) -> bytes:
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     palette = frames[-1].quantize(COLOURS, Image.Quantize.FASTOCTREE)
     images = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    stream = io.BytesIO()
     every = 1000 // FRAMES_PER_SECOND
     images[0].save(stream, "GIF", save_all=True, append_images=images[1:], duration=every, loop=0)
-    return stream.getvalue()

@@ -11,7 +11,6 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.markdown_table import Table, rendered
 from stiffdice.report.number_format import readable, scene_of
 from stiffdice.scene import scene as scenes
-from stiffdice.scene.scene import Scene
 
 # By limit: what happens, the formula, and the unit. ulp: a unit in the last place; a sum loses half of it.
 _ROWS: dict[str, tuple[str, str, str]] = {
@@ -46,25 +45,19 @@ _ROWS: dict[str, tuple[str, str, str]] = {
 def table(experiments: Mapping[str, xr.Dataset], title: str) -> Table:
     """Return a row for each limit: what happens, the formula, what it predicts, and what was found."""
     (found,) = experiments.values()
-    rows = [
-        [_ROWS[name][0], _ROWS[name][1], readable(predicted, 3), readable(measured, 3), _ROWS[name][2]]
-        for name, predicted, measured in zip(
-            meanings_of(found.limit), found.predicted.values.tolist(), found.measured.values.tolist(), strict=True
-        )
-    ]
-    scene = scenes.from_mapping(scene_of(found))
-    return rendered(title, ["limit", "formula", "predicted", "measured", "unit"], rows, _note(found, scene))
-
-
-def _note(found: xr.Dataset, scene: Scene) -> str:
-    stiff = scene.with_ground(stiffness=float(found.attrs["bounce_stiffness"]))
-    omega_h, coarse = float(found.attrs["bounce_omega_h"]), int(found.attrs["coarse"])
-    steps = round(linear_theory.steps_for(stiff, omega_h))
-    slow = found.measured.values[meanings_of(found.limit).index("first_fall")]
-    return (
+    names, measured = meanings_of(found.limit), found.measured.values.tolist()
+    rows = []
+    for name, predicted, value in zip(names, found.predicted.values.tolist(), measured, strict=True):
+        what, formula, unit = _ROWS[name]
+        rows.append([what, formula, readable(predicted, 3), readable(value, 3), unit])
+    scene = scenes.from_mapping(scene_of(found)).with_ground(stiffness=float(found.attrs["bounce_stiffness"]))
+    omega_h, slow = float(found.attrs["bounce_omega_h"]), measured[names.index("first_fall")]
+    note = (
         f"ulp: a unit in the last place. Launch at z = {scene.launch.position[2]:g} m with "
         f"u = {scene.launch.velocity[2]:g} m/s; m = {scene.cube.mass:g} kg, s = {scene.cube.side:.6g} m. Round-off is "
-        f"followed at S = {readable(stiff.ground.stiffness)} kg/s² and ωh = {omega_h:g}, {steps:,} steps in "
-        f"{scene.duration:g} s; the first contact is that of a run of {coarse} steps. A step of {readable(slow)} s is "
+        f"followed at S = {readable(scene.ground.stiffness)} kg/s² and ωh = {omega_h:g}, "
+        f"{round(linear_theory.steps_for(scene, omega_h)):,} steps in {scene.duration:g} s; the first contact is that "
+        f"of a run of {int(found.attrs['coarse'])} steps. A step of {readable(slow)} s is "
         f"{readable(scene.duration / slow)} steps in {scene.duration:g} s."
     )
+    return rendered(title, ["limit", "formula", "predicted", "measured", "unit"], rows, note)

@@ -45,51 +45,53 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels = figure.subplots(rows, 4, squeeze=False).reshape(rows * 2, 2)
     for pair, dataset in zip(panels, found, strict=False):
         for law, panel in enumerate(pair):
-            _map(panel, dataset, law)
-            if law:
-                panel.tick_params(labelleft=False)
-            else:
-                panel.set_ylabel(_NAMES[dataset.attrs["axis"]])
-    handles = _legend(found)
+            _map(panel, dataset.isel(contact=law))
+        pair[0].set_ylabel(_NAMES[dataset.attrs["axis"]])
+        pair[1].tick_params(labelleft=False)
     if len(found) % 2:
         for panel in panels[-1]:
             panel.remove()
-        free = figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.55, 0.05))
-        free.set_in_layout(False)
+        figure.legend(handles=_legend(found), loc="lower left", bbox_to_anchor=(0.55, 0.05)).set_in_layout(False)
     else:
-        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+        figure.legend(handles=_legend(found), loc="outside lower center", ncols=2)
     return figure
 
 
-def _map(panel: Any, dataset: xr.Dataset, law: int) -> None:
-    steps, heights = dataset.steps.values, _rows(dataset)
-    edges = style.borders(steps, logarithmic=True)
-    step = _height(heights)
-    names = meanings_of(dataset.verdict)
-    for height, verdicts in zip(heights, dataset.verdict.values[law], strict=True):
+def _map(panel: Any, dataset: xr.Dataset) -> None:
+    heights, edges = _rows(dataset), style.borders(dataset.steps.values, logarithmic=True)
+    step, names = _height(heights), meanings_of(dataset.verdict)
+    for height, verdicts in zip(heights, dataset.verdict.values, strict=True):
         changes = np.flatnonzero(np.diff(verdicts)) + 1
         for first, last in zip([0, *changes], [*changes, len(verdicts)], strict=True):
             left, right = edges[[first, last]]
             place = {"xy": (left, height - step / 2), "width": right - left, "height": step}
             panel.add_patch(Rectangle(**place, **_fill(names[verdicts[first]])))
-    for name, limits in zip(meanings_of(dataset.limit), dataset.limit_steps.values[:, law], strict=True):
-        _limit(panel, heights, limits, name)
+    # A limit is a line through all numbers but zero, and a stroke in each row that stands alone.
+    numbers = heights > heights.min() + step if np.diff(np.sort(heights))[:1] > step else np.ones(len(heights), bool)
+    for name, limits in zip(meanings_of(dataset.limit), dataset.limit_steps.values, strict=True):
+        look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.3, "label": name}
+        look["path_effects"] = [patheffects.withStroke(linewidth=2.6, foreground="white")]
+        panel.plot(limits[numbers], heights[numbers], **look)
+        for height, limit in zip(heights[~numbers], limits[~numbers], strict=True):
+            panel.plot([limit, limit], [height - step / 2, height + step / 2], **look)
     panel.set(xscale="log", xlim=edges[[0, -1]], ylim=(heights.min() - step / 2, heights.max() + step / 2))
     panel.grid(visible=False)
-    panel.set_yticks(*_ticks(dataset, heights))
+    value = dataset["value"]
+    if "flag_meanings" in value.attrs:
+        panel.set_yticks(heights, [meanings_of(value)[int(k)].replace("_", " ") for k in value.values])
+    else:
+        # Zero, and of many numbers each so many.
+        every = math.ceil((value.values > 0).sum() / 8) if len(heights) > 12 else 1
+        shown = [*np.flatnonzero(value.values == 0), *np.flatnonzero(value.values > 0)[::every]]
+        panel.set_yticks(heights[shown], [readable(float(value.values[k])) for k in shown])
     panel.set_xlabel("time steps [1]")
-    panel.set_title(f"{dataset.attrs['axis']}, {style.law_of(dataset.isel(contact=law))}")
+    panel.set_title(f"{dataset.attrs['axis']}, {style.law_of(dataset)}")
 
 
 def _fill(verdict: str) -> dict[str, Any]:
     look = style.VERDICT_LOOKS[verdict]
-    hatched = "hatch" in look
-    return {
-        "facecolor": look["color"],
-        "edgecolor": style.QUIET if hatched else "white",
-        "hatch": look.get("hatch"),
-        "linewidth": 0.0 if hatched else 0.4,
-    }
+    edge = {"edgecolor": style.QUIET, "linewidth": 0.0} if "hatch" in look else {"edgecolor": "white", "linewidth": 0.4}
+    return {"facecolor": look["color"], "hatch": look.get("hatch"), **edge}
 
 
 def _rows(dataset: xr.Dataset) -> Array:
@@ -106,38 +108,14 @@ def _height(heights: Array) -> float:
     return float(np.diff(np.sort(heights)).min()) if len(heights) > 1 else 1.0
 
 
-def _limit(panel: Any, heights: Array, limits: Array, name: str) -> None:
-    """Draw a limit, a line through all numbers but zero and a stroke for each row that stands alone."""
-    step = _height(heights)
-    look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.3}
-    look["path_effects"] = [patheffects.withStroke(linewidth=2.6, foreground="white")]
-    numbers = heights > heights.min() + step if np.diff(np.sort(heights))[:1] > step else np.ones(len(heights), bool)
-    panel.plot(limits[numbers], heights[numbers], label=name, **look)
-    for height, limit in zip(heights[~numbers], limits[~numbers], strict=True):
-        panel.plot([limit, limit], [height - step / 2, height + step / 2], label=name, **look)
-
-
-def _ticks(dataset: xr.Dataset, heights: Array) -> tuple[Array, list[str]]:
-    value = dataset["value"]
-    if "flag_meanings" in value.attrs:
-        names = meanings_of(value)
-        return heights, [names[int(k)].replace("_", " ") for k in value.values]
-    shown = np.arange(len(heights))
-    if len(heights) > 12:
-        numbers = np.flatnonzero(value.values > 0)
-        shown = np.concatenate([np.flatnonzero(value.values == 0), numbers[:: math.ceil(len(numbers) / 8)]])
-    return heights[shown], [readable(float(value.values[k])) for k in shown]
-
-
 def _legend(found: list[xr.Dataset]) -> list[Any]:
-    names = meanings_of(found[0].verdict)
+    names, limits = meanings_of(found[0].verdict), meanings_of(found[0].limit)
     occurring = {names[verdict] for dataset in found for verdict in np.unique(dataset.verdict.values)}
     handles: list[Any] = [
         Patch(**_fill(name) | {"linewidth": 0.4, "edgecolor": style.QUIET}, label=Verdict[name.upper()].sentence)
         for name in style.VERDICT_LOOKS
         if name in occurring
     ]
-    limits = meanings_of(found[0].limit)
     for name, look in _LIMIT_LOOKS.items():
         if any(np.isfinite(dataset.limit_steps.values[limits.index(name)]).any() for dataset in found):
             handles.append(style.line(color=style.INK, linewidth=1.3, **look))

@@ -5,9 +5,9 @@ import dataclasses
 import pytest
 from tests.advice.problems import held, scene
 
-from stiffdice.advice.check import check, run_advised
 from stiffdice.advice.pilot import SAMPLES, curve
 from stiffdice.advice.recommend import advise
+from stiffdice.advice.result import check, run_advised
 from stiffdice.integrators import registry as schemes
 from stiffdice.simulation.run import simulate
 

@@ -5,11 +5,10 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
-from stiffdice.experiments import failure_map, friction_chatter
+from stiffdice.experiments import failure_map
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures import friction_chatter as chatter_drawing
+from stiffdice.report.figures import failure_map as drawing
 from stiffdice.report.figures import style
-from stiffdice.report.figures.stability import failure_map as drawing
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.outcome import Verdict
 
@@ -80,15 +79,3 @@ def test_the_legend_names_what_occurs_and_nothing_else(data, figure):
     occurring = {Verdict(v) for dataset in data.values() for v in np.unique(dataset.verdict.values)}
     assert {text for text in texts if not text.startswith("theory")} == {verdict.sentence for verdict in occurring}
     assert not any("half a turn in a step" in text for text in texts)
-
-
-def test_chatter_is_drawn_over_theory():
-    dataset = friction_chatter.measure(Scene(), friction=(0.075,), step_size=(1e-6, 1e-5, 1e-4))
-    with style.applied():
-        (panel,) = chatter_drawing.draw({"chatter": dataset}, "A title").axes
-    assert "[s]" in panel.get_xlabel()
-    assert "[m/s]" in panel.get_ylabel()
-    swings, rests, curve = (np.asarray(line.get_xydata()) for line in panel.get_lines()[:3])
-    np.testing.assert_allclose(swings, np.stack([[1e-5, 1e-4], dataset.swing.values[0, 1:]], axis=1))
-    assert rests[:, 0] == [1e-6]
-    np.testing.assert_allclose(curve[:, 1], 0.075 * 9.8 * curve[:, 0] / 2 - 1e-6, atol=1e-12)

@@ -5,7 +5,7 @@ import pytest
 from tests.report.figures.drawing import drawn
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.experiments import rocking
+from stiffdice.experiments import friction_chatter, rocking
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene.scene import Scene
 
@@ -93,3 +93,14 @@ def test_growth_is_drawn_over_theory(panels, dataset):
     for curve, zeta in zip(curves, (0.0, 0.2), strict=True):
         wanted = [linear_theory.growth(part * linear_theory.stability_limit(zeta), zeta) for part in curve[:, 0]]
         np.testing.assert_allclose(curve[:, 1], wanted)
+
+
+def test_chatter_is_drawn_over_theory():
+    dataset = friction_chatter.measure(Scene(), friction=(0.075,), step_size=(1e-6, 1e-5, 1e-4))
+    (panel,) = drawn("friction-chatter", {"chatter": dataset}).axes
+    assert "[s]" in panel.get_xlabel()
+    assert "[m/s]" in panel.get_ylabel()
+    swings, rests, curve = (np.asarray(line.get_xydata()) for line in panel.get_lines()[:3])
+    np.testing.assert_allclose(swings, np.stack([[1e-5, 1e-4], dataset.swing.values[0, 1:]], axis=1))
+    assert rests[:, 0] == [1e-6]
+    np.testing.assert_allclose(curve[:, 1], 0.075 * 9.8 * curve[:, 0] / 2 - 1e-6, atol=1e-12)

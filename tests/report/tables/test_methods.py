@@ -6,7 +6,7 @@ import xarray as xr
 
 from stiffdice.experiments.measuring import coordinates
 from stiffdice.experiments.work_precision.measure import GRID
-from stiffdice.report.tables.work_precision import cost_of, found_in, table, targets
+from stiffdice.report.tables.methods import cost_of, engines_note, found_in, targets, work_precision
 
 COSTS = np.array([1e2, 1e3, 1e4, 1e5, 1e6])
 
@@ -108,7 +108,7 @@ def test_targets_are_ratios_at_equal_error():
 
 
 def test_the_table_has_the_cheapest_scheme_and_scipys_best_beside():
-    lines = table(THROW, "A title").markdown.splitlines()
+    lines = work_precision(THROW, "A title").markdown.splitlines()
     (row,) = (line for line in lines if line.startswith("| tumbling throw | 100 | 1e-06 |"))
     cells = [cell.strip() for cell in row.split("|")[4:-1]]
     assert cells == ["1,000 (event)", "4,000 (SciPy LSODA)", "4", "10 µs (event)", "1 ms (SciPy LSODA)", "100"]
@@ -117,5 +117,20 @@ def test_the_table_has_the_cheapest_scheme_and_scipys_best_beside():
 def test_where_nobody_timed_nothing_is_told_of_time():
     alone = {"found": THROW["found"]}
     assert found_in(alone.values())[0].seconds is None
-    assert "µs" not in table(alone, "A title").markdown
+    assert "µs" not in work_precision(alone, "A title").markdown
     assert len(targets(alone, "A title").csv.splitlines()) == 3
+
+
+def compared(*methods, versions=""):
+    words = {"flag_values": np.arange(len(methods)), "flag_meanings": " ".join(methods)}
+    return xr.Dataset({"method": ("method", np.arange(len(methods)), words)}, attrs={"engine_versions": versions})
+
+
+def test_schemes_and_solvers_alone_need_no_word_on_engines():
+    assert engines_note([compared("event", "scipy_lsoda")]) == ""
+
+
+def test_a_solver_of_scipy_stands_for_scipy():
+    note = engines_note([compared("mujoco", "scipy_dop853", versions="MuJoCo 4.0.0; SciPy 1.17.1")])
+    assert note.startswith("Engines: MuJoCo 4.0.0, SciPy 1.17.1. Left out or not installed: PyBullet, Drake,")
+    assert "SciPy LSODA" not in note

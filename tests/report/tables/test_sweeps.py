@@ -9,7 +9,7 @@ import xarray as xr
 
 from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import enum_attributes
-from stiffdice.report.tables import paper_questions
+from stiffdice.report.tables.sweeps import paper_questions
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import dataset
 from stiffdice.sweep.stability_limits import find
@@ -40,7 +40,7 @@ def frontier(stiffness, steps, failing, criterion="apex"):
 
 
 def told(sweeps):
-    table = paper_questions.table(sweeps, "Answers")
+    table = paper_questions(sweeps, "Answers")
     return {row["question"]: row["gated"] for row in csv.DictReader(io.StringIO(table.csv))}
 
 
@@ -67,9 +67,9 @@ def test_what_was_not_scanned_and_what_never_passes_is_said():
 
 def test_the_stiffest_ground_that_all_have_is_told():
     soft, stiff = frontier(1e4, [1000, 2000], [1, 0]), frontier(1e6, [10_000, 20_000], [1, 0])
-    assert "S = 1e+06 kg/s²" in paper_questions.table({"a": stiff}, "A").markdown
+    assert "S = 1e+06 kg/s²" in paper_questions({"a": stiff}, "A").markdown
     with pytest.raises(InputError, match="a stiffness in common"):
-        paper_questions.table({"a": soft, "b": stiff}, "A")
+        paper_questions({"a": soft, "b": stiff}, "A")
 
 
 def test_ends_of_a_scan_are_only_bounds():
@@ -89,8 +89,8 @@ def test_sweeps_of_another_kind_are_not_merged():
     one, other = frontier(1e6, [20_000], [0]), frontier(1e6, [20_000], [0])
     other["tolerance"] = other.tolerance + 1
     with pytest.raises(InputError, match="asks apex at another tolerance"):
-        paper_questions.table({"one": one, "other": other}, "A")
+        paper_questions({"one": one, "other": other}, "A")
     other = frontier(1e6, [20_000], [0])
     other.attrs["scene_digest"] = "0" * 64
     with pytest.raises(InputError, match="sweep other has another scene"):
-        paper_questions.table({"one": one, "other": other}, "A")
+        paper_questions({"one": one, "other": other}, "A")

@@ -16,6 +16,7 @@ from stiffdice.report.figures import style
 from stiffdice.report.number_format import ground_words
 from stiffdice.sweep.refinement_check import WIDTH, Column, Scan, band, binned, bins, common, effort, scans
 
+_Scans = Mapping[str, Mapping[Column, Scan]]  # by sweep, the dense one first
 _EDGES = {"last_fail": "last fail", "first_pass": "first pass"}
 # Of the dense sweep and of those compared with it, in turn: colour, mark, and where it is put beside its stiffness.
 _LOOKS: tuple[dict[str, Any], ...] = (
@@ -62,13 +63,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     return figure
 
 
-def _edges(
-    panel: Any,
-    columns: list[Column],
-    found: Mapping[str, Mapping[Column, Scan]],
-    products: Mapping[float, float],
-    edge: str,
-) -> None:
+def _edges(panel: Any, columns: list[Column], found: _Scans, products: Mapping[float, float], edge: str) -> None:
     """Draw an edge of every criterion over stiffness: the dense scan's band, and a mark for each sweep."""
     panel.set(xscale="log", yscale="log", xlabel=style.STIFFNESS)
     dense = next(iter(found.values()))
@@ -85,25 +80,21 @@ def _edges(
             panel.fill_between(ends, products[column.stiffness] / high, products[column.stiffness] / low, **box)
         for look, parts in zip(_LOOKS, found.values(), strict=False):
             steps = np.array([parts[column].edges[edge] for column in along])
-            mark = _open(look) | {"color": color, "markeredgewidth": 1.1, "linestyle": "none", "zorder": 3}
+            mark = _open(look, color=color, markeredgewidth=1.1, linestyle="none", zorder=3)
             panel.plot(stiffness * look["beside"], product / steps, **mark)
     panel.axhline(linear_theory.STABILITY_LIMIT, **style.THEORY)
     style.plain_log_ticks(panel.yaxis, (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0))
 
 
-def _open(look: Mapping[str, Any], size: float | None = None) -> dict[str, Any]:
+def _open(look: Mapping[str, Any], **other: Any) -> dict[str, Any]:
     """Return an open mark of a sweep's look."""
-    size = look["markersize"] if size is None else size
-    return {"color": look["color"], "marker": look["marker"], "markersize": size, "markerfacecolor": "none"}
+    return {name: look[name] for name in ("color", "marker", "markersize")} | {"markerfacecolor": "none"} | other
 
 
-def _shares(
-    panel: Any, columns: list[Column], found: Mapping[str, Mapping[Column, Scan]], products: Mapping[float, float]
-) -> None:
+def _shares(panel: Any, columns: list[Column], found: _Scans, products: Mapping[float, float]) -> None:
     """Draw pass fractions of the least clear scan on the stiffest ground: means in bins, with 95 % bands."""
     panel.set(xscale="log", ylim=(-0.04, 1.08), xlabel=style.OMEGA_H)
     dense = next(iter(found.values()))
-    # On the stiffest ground, where most cells are in doubt.
     column = max(columns, key=lambda column: (column.stiffness, np.count_nonzero(dense[column].shares % 1)))
     product, stiffest = products[column.stiffness], column.stiffness
     ends = bins(*(parts[column] for parts in found.values()))
@@ -118,7 +109,7 @@ def _shares(
         else:
             aside = centres * (1 + 0.012 * (2 * k - len(found)))
             bars = np.stack([mean - low, high - mean]).clip(0)
-            panel.errorbar(aside, mean, bars, linestyle="none", elinewidth=0.9, zorder=3, **_open(look, 3))
+            panel.errorbar(aside, mean, bars, linestyle="none", elinewidth=0.9, zorder=3, **_open(look, markersize=3))
     panel.set_title(f"{column.criterion}, {ground_words(stiffness=stiffest)}", fontsize=8.5)
     panel.set_xlim(product / np.exp(ends[-1]), product / np.exp(ends[0]))
     style.plain_log_ticks(panel.xaxis)
@@ -128,10 +119,10 @@ def _density(panel: Any, sweeps: Mapping[str, xr.Dataset], law: str, span: tuple
     """Draw how many cells of each sweep lie at an ωh, on average over stiffness."""
     panel.set(xscale="log", xlim=span, xlabel=style.OMEGA_H)
     ends = np.geomspace(*span, _DENSITY_BINS + 1)
-    width = np.log(span[1] / span[0]) / _DENSITY_BINS
     for k, (look, found) in enumerate(zip(_LOOKS, sweeps.values(), strict=False)):
         here = found.cell_contact.values == meanings_of(found.contact).index(law)
-        counts = np.histogram(found.cell_omega_h.values[here], ends)[0] / found.sizes["stiffness"] / width
+        counts = np.histogram(found.cell_omega_h.values[here], ends)[0] / found.sizes["stiffness"]
+        counts /= np.log(span[1] / span[0]) / _DENSITY_BINS
         if k > 1:
             panel.stairs(counts, ends, fill=True, color=look["color"], alpha=0.25)
         panel.stairs(counts, ends, baseline=None, color=look["color"], linewidth=1.2 if k != 1 else 0.7)
@@ -147,7 +138,7 @@ def _legend(sweeps: Mapping[str, xr.Dataset], criteria: Iterable[str]) -> list[A
     for k, (look, (name, data)) in enumerate(zip(_LOOKS, sweeps.items(), strict=False)):
         runs, steps = effort(data)
         part = f" ({runs / whole[0]:.0%}), {steps / whole[1]:.0%} of the steps" if k else ""
-        handles.append(style.mark(f"{name}: {runs:,} runs{part}", **_open(look, 6)))
+        handles.append(style.mark(f"{name}: {runs:,} runs{part}", **_open(look, markersize=6)))
     tolerances = dict(zip(meanings_of(first.criterion), first.tolerance.values.tolist(), strict=True))
     for criterion in criteria:
         words = f"{criterion}: {style.criterion_words(criterion, tolerances[criterion])}"

@@ -1,0 +1,134 @@
+"""Figures of runs: the cube as a wireframe above its ground (1 to 3, and moving); position and energy (4 to 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+from stiffdice.report.figures import style
+from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
+from stiffdice.report.number_format import describe, scene_of
+from stiffdice.scene.cube import LINKS
+
+
+def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
+    """Return the cube at a moment: 0 is the start of the run, 1 its end."""
+    run = next(iter(runs.values()))
+    index = round(moment * (run.sizes["time"] - 1))
+    figure, show = _stage(run, f"{title}, t = {float(run.time[index]):.1f} s")
+    show(index)
+    return figure
+
+
+start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
+
+
+def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
+    """Return the whole run in real time."""
+    run = next(iter(runs.values()))
+    figure, show = _stage(run, title)
+    clock = figure.text(0.99, 0.97, "", ha="right", va="top")
+    count = max(2, round(float(run.time[-1]) * FRAMES_PER_SECOND))
+    indices = np.linspace(0, run.sizes["time"] - 1, count).round().astype(int)
+
+    def frame(number: int) -> list[Any]:
+        clock.set_text(f"t = {float(run.time[indices[number]]):4.1f} s")
+        return [*show(int(indices[number])), clock]
+
+    return Animation(figure, frame, count)
+
+
+def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[Any]]]:
+    """Return a figure with the ground in 3-D axes, equal in scale, and a function that shows the cube at a sample."""
+    figure = style.new_figure(title, height=3.2)
+    figure.set_layout_engine("none")
+    style.add_note(figure, describe(run, law=True))
+    axes: Any = figure.add_axes((-0.26, -0.22, 1.44, 1.44), projection="3d", computed_zorder=False)
+    # A box, on whole metres, that holds the cube for the whole run.
+    reach = float(np.linalg.norm(run.node_offset.values[0], axis=-1).max())
+    low, high = np.floor(run.position.values.min(axis=0) - reach), np.ceil(run.position.values.max(axis=0) + reach)
+    middle = (low[1] + high[1]) / 2
+    low[1], high[1] = min(low[1], middle - 3), max(high[1], middle + 3)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
+    axes.set_box_aspect((high[0] - low[0], high[1] - low[1], high[2]), zoom=1.25)
+    axes.view_init(elev=18, azim=-70)
+    # The plane n·x = 0 under the run, with a grid of two metres.
+    nx, ny, nz = scene_of(run)["ground"]["normal"]
+    if nz != 0:  # a wall has no height over x and y
+        x, y = np.meshgrid(*([low[k], *np.arange(low[k] // 2 * 2 + 2, high[k], 2), high[k]] for k in (0, 1)))
+        z = -(nx * x + ny * y) / nz
+        look: dict[str, Any] = {"color": "#f3eee4", "edgecolor": style.FAINT, "linewidth": 0.6, "shade": False}
+        axes.plot_surface(x, y, z, rstride=1, cstride=1, zorder=0, clip_on=False, **look)
+        border = [0, 0, -1, -1, 0], [0, -1, -1, 0, 0]
+        axes.plot(x[border], y[border], z[border], color=style.QUIET, linewidth=1.0, zorder=1, clip_on=False)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_visible(False)
+    axes.grid(visible=False)
+    axes.set_xlabel("x [m]", labelpad=10)
+    axes.set_ylabel("y [m]", labelpad=2)
+    axes.set_zlabel("z [m]", labelpad=-6)
+    axes.set_yticks(np.arange(np.ceil(low[1] / 2) * 2, high[1] + 1, 2))
+    axes.set_zticks([0, 2, 4])
+    axes.tick_params(labelsize=7.5, pad=-1)
+    places, nodes = run.position.values, run.position.values[:, None] + run.node_offset.values
+    look = {"colors": style.BLUE, "linewidths": 1.3, "zorder": 4, "clip_on": False}
+    edges = axes.add_collection3d(Line3DCollection(np.zeros((1, 2, 3)), **look))
+    (trace,) = axes.plot(*places[:1].T, color=style.QUIET, linewidth=0.8, zorder=3, clip_on=False)
+
+    def show(sample: int) -> list[Any]:
+        edges.set_segments(nodes[sample][np.array(LINKS)])
+        trace.set_data_3d(*places[: sample + 1].T)
+        return [edges, trace]
+
+    return figure, show
+
+
+def position(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return x, y and z of the centre of mass against time; y only where the cube leaves the plane y = 0."""
+    leaves_plane = any(np.abs(run.position[:, 1]).max() > 1e-9 for run in runs.values())
+    shown = (0, 1, 2) if leaves_plane else (0, 2)
+    figure = style.new_figure(title, height=1.4 + 1.35 * len(shown))
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for panel, k in zip(panels, shown, strict=True):
+        for preset, run in runs.items():
+            panel.plot(run.time, run.position[:, k], **style.PRESET_LOOKS[preset])
+        panel.set_ylabel(f"{'xyz'[k]} [m]")
+    panels[-1].axhline(0, color=style.INK, linewidth=0.8, linestyle=":")
+    panels[-1].annotate("ground", (0.005, 0), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=7.5)
+    panels[0].legend(ncols=3, loc="upper left")
+    return _finish(figure, panels[-1], runs)
+
+
+def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the paper's energy and the mechanical one against time, a panel for each preset.
+
+    The mechanical one takes the velocity at the time of the place; files of before format 1.3 lack it, and get the sum
+    of the stored energies.
+    """
+    figure = style.new_figure(title, height=1.3 + 1.75 * len(runs))
+    panels = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for panel, (preset, run) in zip(panels, runs.items(), strict=True):
+        look = style.PRESET_LOOKS[preset]
+        full = run.get("mechanical_energy", run.energy_paper + run.elastic_energy)
+        panel.axhline(float(full[0]), color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
+        panel.plot(run.time, full, color=style.INK, linewidth=2.4, label="mechanical: with the springs")
+        panel.plot(run.time, run.energy_paper, color=look["color"], label="paper's: kinetic + m g z", zorder=3)
+        panel.set_title(look["label"])
+        panel.set_ylabel("energy [J]")
+        panel.legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 0.97), borderaxespad=0)
+    lowest = min(0.0, *(float(run.energy_paper.min()) for run in runs.values()))
+    panels[0].set_ylim(bottom=lowest)  # after all is drawn: it ends the automatic scaling
+    return _finish(figure, panels[-1], runs)
+
+
+def _finish(figure: Figure, lowest: Any, runs: Mapping[str, xr.Dataset]) -> Figure:
+    lowest.set_xlabel("time [s]")
+    lowest.margins(x=0.01)
+    style.add_note(figure, describe(next(iter(runs.values()))))
+    return figure
