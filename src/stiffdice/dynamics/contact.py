@@ -1,6 +1,6 @@
 """What the ground does to one node: the normal force by contact law, and friction (paper, section 4.2).
 
-Under every contact law (`scene/ground.py`) the force is linear in depth and speed wherever it is not zero. The closed
+Under every contact law (`scene/flat_landing.py`) the force is linear in depth and speed wherever it is not zero. The closed
 forms (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
