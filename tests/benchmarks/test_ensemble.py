@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
+import numba
 import numpy as np
 import pytest
 from benchmarks.ensemble import FLOPS
 from benchmarks.scenes import scene_of
 
-from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.state import Ensemble
 from stiffdice.integrators import member_block
 from stiffdice.simulation import batch_loop
@@ -42,7 +42,8 @@ def operations(assembly):
 @pytest.mark.long
 @pytest.mark.parametrize(("model", "contact"), FLOPS)
 def test_operations_are_those_of_the_compiled_loop(model, contact, monkeypatch):
-    loop = njit(batch_loop._march.py_func)  # what comes from the cache has no assembly
+    # What comes from the cache has no assembly.
+    loop = numba.njit(batch_loop._march.py_func, error_model="numpy", fastmath=False)
     monkeypatch.setattr(batch_loop, "_march", loop)
     scene = scene_of(contact, 10)
     launches = turned(scene, model, 4)

@@ -44,7 +44,7 @@ def test_what_takes_long_is_said_once(monkeypatch, capsys, quiet, told):
 
 def test_compiling_is_said_once(capsys):
     with progress.progress("event"):
-        tell = compilation._TELLING.get()
+        tell = compilation.TELLING.get()
         tell(), tell()
     assert capsys.readouterr().err == "compiling the kernels of event, once; about 12 s\n"
-    assert compilation._TELLING.get() is None
+    assert compilation.TELLING.get() is None

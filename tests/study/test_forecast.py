@@ -24,10 +24,10 @@ def compiled(monkeypatch, tmp_path):
     """A folder with the loop of a run, compiled, under the name that Numba gives it."""
     loop = batch_loop._march
     package, _, module = loop.py_func.__module__.rpartition(".")
+    monkeypatch.setattr(forecast, "cache_folder", lambda: tmp_path)
     folder = tmp_path / f"{package.rpartition('.')[2]}_0123456789abcdef"
     folder.mkdir()
     (folder / f"{module}.{loop.py_func.__qualname__}-1.py311.0123456789abcdef.nbc").touch()
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 
 
 @pytest.mark.usefixtures("compiled")
@@ -54,7 +54,7 @@ def test_what_was_measured_is_foretold_within_a_factor_of_one_and_a_half(load, n
 def test_where_nothing_is_compiled_it_takes_longer(load, compiled, monkeypatch, tmp_path):
     study = load("paper")
     warm = forecast.seconds(study)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "nowhere"))
+    monkeypatch.setattr(forecast, "cache_folder", lambda: tmp_path / "nowhere")
     more = {result: seconds - warm[result] for result, seconds in forecast.seconds(study).items()}
     assert {result.stage for result, seconds in more.items() if seconds} == {"trajectory", "shard"}
     assert sum(more.values()) == pytest.approx(2 * 4 + 9)  # two models of runs, one of the sweep

@@ -14,7 +14,7 @@ LOAD = """
 from stiffdice.simulation import run
 from stiffdice.study import config, warm_up
 looks = list(warm_up.load_kernels(config.load("config/quick.yaml", "workflow/schemas/study.schema.yaml")))
-print(len(looks), len(run._march.overloads))
+print(len(looks), len(run._march.dispatcher.overloads))
 """
 # Runs what `quick` runs, in the listings' order.
 RUN = """

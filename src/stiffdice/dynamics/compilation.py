@@ -1,39 +1,34 @@
-"""`njit` with a cache on disk that never serves stale code.
+"""What numba compiles, and in which folder that is kept on disk; numba itself comes with `compiler.py`, once it does so.
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
-versions that compile them. Each file in it begins with its own digest, and is known by the processor that it is for;
-what does not match is compiled again.
+versions that compile them.
 """
 
 from __future__ import annotations
 
 import contextlib
-import gc
 import hashlib
-import inspect
 import os
-import pickle
-import shutil
 import stat
 import tempfile
-import uuid
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
-from functools import cache, partial
+from functools import cache, cached_property, partial, update_wrapper
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numba
-from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, serialize, typed_passes
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
-
 from stiffdice.dynamics.code_digest import code_digest
 from stiffdice.errors import OutputError
 
+LOADING: ContextVar[bool] = ContextVar("LOADING", default=False)
+TELLING: ContextVar[Callable[[], None] | None] = ContextVar("TELLING", default=None)
 
-def _cache_folder() -> Path:
+
+@cache
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels, made if it was not there; raises OutputError where none can be."""
     parts = [code_digest("stiffdice.simulation.run"), version("numba"), version("numpy"), version("llvmlite")]
     name = "kernels-" + hashlib.sha256(" ".join(parts).encode()).hexdigest()[:16]
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
@@ -66,15 +61,6 @@ def _is_made(folder: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & stat.S_IWOTH
 
 
-# In the environment for child processes and for numba to find when it reads it again.
-os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())
-setattr(numba.config, "CACHE_DIR", os.environ["NUMBA_CACHE_DIR"])  # noqa: B010 (mypy knows no such attribute)
-
-_DIGEST = hashlib.sha256().digest_size
-_LOADING: ContextVar[bool] = ContextVar("_LOADING", default=False)
-_TELLING: ContextVar[Callable[[], None] | None] = ContextVar("_TELLING", default=None)
-
-
 class NotStoredError(Exception):
     """A kernel is not on disk, and is not to be compiled now."""
 
@@ -82,190 +68,60 @@ class NotStoredError(Exception):
 @contextlib.contextmanager
 def only_stored() -> Iterator[None]:
     """Raise NotStoredError where the block would have to compile a kernel."""
-    token = _LOADING.set(True)
+    token = LOADING.set(True)
     try:
         yield
     finally:
-        _LOADING.reset(token)
+        LOADING.reset(token)
 
 
 @contextlib.contextmanager
 def telling(compiles: Callable[[], None]) -> Iterator[None]:
     """Call a function before a kernel is compiled in the block."""
-    token = _TELLING.set(compiles)
+    token = TELLING.set(compiles)
     try:
         yield
     finally:
-        _TELLING.reset(token)
+        TELLING.reset(token)
 
 
-class KernelFiles:
-    """The kernels of one function, a file for each signature and processor: SHA-256, then key and kernel, pickled.
+class Compiled:
+    """A function that numba compiles. Numba is imported once it is called, or taken into another that is.
 
-    Numba's own files know no damage; and two processes that compile two signatures at once may give both the same
-    number. folder: where they lie. name: of the function. stamp: of its source; part of every key.
+    bodies: by the type of the first argument, of a function that calls one of them with the others. options: numba's.
     """
 
-    def __init__(self, folder: Path, name: str, stamp: object) -> None:
-        self._folder, self._name, self._stamp = folder, name, stamp
+    def __init__(self, function: Callable[..., Any], bodies: dict[type, Any] | None, options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._bodies, self._options = function, bodies, options
 
-    def path(self, key: object) -> Path:
-        """Return where the kernel of a key is kept."""
-        name = hashlib.sha256(repr((self._stamp, key)).encode()).hexdigest()[:16]
-        return self._folder / f"{self._name}.{name}.nbc"
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba has for the function."""
+        from stiffdice.dynamics import compiler
 
-    def load(self, key: object) -> Any:
-        """Return the kernel of a key; None if there is none, or a damaged one. Nothing damaged is unpickled."""
-        try:
-            content = memoryview(self.path(key).read_bytes())
-        except OSError:
-            return None
-        if hashlib.sha256(content[_DIGEST:]).digest() != content[:_DIGEST]:
-            return None
-        saved, kernel = pickle.loads(content[_DIGEST:])
-        return kernel if saved == (self._stamp, key) else None
+        return compiler.dispatcher_of(self.py_func, self._bodies, self._options)
 
-    def save(self, key: object, kernel: Any) -> None:
-        """Keep the kernel of a key in place of whatever is there; raises OSError if it cannot be stored."""
-        path, content = self.path(key), serialize.dumps(((self._stamp, key), kernel))  # type: ignore[no-untyped-call]
-        part = path.with_name(f"{path.name}.{uuid.uuid4().hex}.part")
-        if path.is_dir():
-            shutil.rmtree(path)
-        try:
-            part.write_bytes(hashlib.sha256(content).digest() + content)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-
-
-class _Locator(UserProvidedCacheLocator):
-    """The folder chosen above, and no other: the others that numba tries would serve stale kernels."""
-
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator:
-        return cls(py_func, py_file)
-
-
-class _Implementation(CompileResultCacheImpl):
-    _locator_classes = [_Locator]  # noqa: RUF012 (as numba has it)
-
-
-class _KernelCache(FunctionCache):
-    """Numba's cache of a function, with files of our own."""
-
-    _impl_class = _Implementation
-    _cache_file: Any
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)  # type: ignore[no-untyped-call]
-        locator = self._impl.locator
-        folder, stamp = Path(locator.get_cache_path()), locator.get_source_stamp()
-        self._cache_file = KernelFiles(folder, self._impl.filename_base, stamp)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return what is stored, None if that is nothing; raises NotStoredError for nothing in `only_stored`."""
-        found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        if found is None and _LOADING.get():
-            raise NotStoredError
-        if found is None and (compiles := _TELLING.get()) is not None:
-            compiles()
-        return found
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled; where it cannot be stored, it serves this process alone."""
-        with contextlib.suppress(OSError):
-            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
-
-
-# Of these numba has no types.
-_Library: Any = codegen.JITCodeLibrary
-_Lowering: Any = typed_passes.NativeLowering
-_Compiler: Any = compiler.Compiler
-_Dispatcher: Any = registry.CPUDispatcher
-_FunctionCompiler: Any = vars(dispatcher)["_FunctionCompiler"]
-_register_pass: Any = compiler_machinery.register_pass
-
-
-class _Kernel(_Dispatcher):  # type: ignore[misc]
-    """A compiled function that Python calls."""
-
-    def compile(self, sig: Any) -> Any:
-        """Compile for a signature, or load what is stored; garbage is left, as most of what that makes stays."""
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile(sig)
-        finally:
-            if enabled:
-                gc.enable()
-
-
-class _Part(_Dispatcher):  # type: ignore[misc]
-    """A compiled function that is meant for compiled code, without machine code and wrappers for calls from Python.
-
-    They are half of all time to compile. Who does call it from Python, a test, say, has a kernel made for the call;
-    numba's own would jump to nowhere.
-    """
-
-    def compile(self, sig: Any) -> Any:
-        """Compile for a signature; what calls for it holds numba's lock, and is what numba times."""
-        arguments = tuple(sig)
-        if arguments not in self.overloads:
-            with self._compiling_counter:
-                self.add_overload(self._compiler.compile(arguments, None))
-        return self.overloads[arguments].entry_point
-
-    def add_overload(self, cres: Any) -> None:
-        """Keep what was compiled for compiled code to find, and for nobody else."""
-        self.overloads[tuple(cres.signature.args)] = cres
+    @property
+    def _numba_type_(self) -> Any:
+        return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
-        bound = inspect.signature(self.py_func).bind(*arguments, **named)
-        return _callable(self)(*bound.args)
+        """Call it, compiled for these arguments if it was not."""
+        return self.dispatcher(*arguments, **named)
 
 
-class _PartLibrary(_Library):  # type: ignore[misc]
-    """LLVM code of a part: optimised and turned into machine code with the kernel that takes it in, not before."""
+class Intrinsic:
+    """A function for compiled code only that writes LLVM's. module: returns its module, once compiled code calls it."""
 
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
+    def __init__(self, module: Callable[[], Any], name: str) -> None:
+        self._module, self._name = module, name
 
-    def _optimize_final_module(self) -> None:
-        pass
+    @property
+    def _numba_type_(self) -> Any:
+        from stiffdice.dynamics import compiler
 
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-
-@_register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(_Lowering):  # type: ignore[misc]
-    def run_pass(self, state: Any) -> bool:
-        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.flags.no_compile = True
-        super().run_pass(state)
-        entry = object()  # by which what calls the part finds it
-        state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
-        state["cr"] = state["cr"]._replace(cfunc=entry)
-        return True
-
-
-class _PartCompiler(_Compiler):  # type: ignore[misc]
-    def define_pipelines(self) -> list[Any]:
-        (pipeline,) = super().define_pipelines()
-        pipeline.passes = [
-            (_PartLowering if made is _Lowering else made, description) for made, description in pipeline.passes
-        ]
-        pipeline.finalize()
-        return [pipeline]
-
-
-@cache
-def _callable(part: _Part) -> Any:
-    def call(*arguments: Any) -> Any:
-        return part(*arguments)
-
-    return numba.njit(call, error_model="numpy", fastmath=False)
+        return compiler.type_of(getattr(self._module(), self._name))
 
 
 def njit(function: Any = None, **options: Any) -> Any:
@@ -277,28 +133,12 @@ def njit(function: Any = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(njit, **options)
-    options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
-    if not options.pop("cache", False):
-        bare = options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        return _Part(function, targetoptions=bare, pipeline_class=_PartCompiler)
-    kernel = _Kernel(function, targetoptions=options | {"no_cfunc_wrapper": True})
-    kernel._cache = _KernelCache(function)
-    return kernel
+    return Compiled(function, None, {"error_model": "numpy", "fastmath": False, "nopython": True} | options)
 
 
 def constant(value: Any) -> Any:
     """Return a function, for compiled code only, that returns a value whatever its arguments."""
     return njit(lambda *arguments: value)
-
-
-class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]
-    """Compiles, for a tag, a call of the body that it stands for."""
-
-    bodies: dict[type, Any]
-
-    def _get_implementation(self, args: Any, kws: Any) -> Any:
-        body = self.bodies[args[0].instance_class]
-        return lambda tag, *arguments: body(*arguments)
 
 
 def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
@@ -310,10 +150,8 @@ def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
     it (1 µs against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
     """
 
-    @njit(forceinline=inlined)
     def call(tag: Any, *arguments: Any) -> Any:
         raise TypeError("chosen by the type of the tag")
 
-    call._compiler.__class__ = _ChoiceCompiler
-    call._compiler.bodies = bodies
-    return call
+    options = {"error_model": "numpy", "fastmath": False, "nopython": True, "forceinline": inlined}
+    return Compiled(call, bodies, options)

@@ -1,7 +1,7 @@
 """What the ground does to one node: the normal force by contact law, and friction (paper, section 4.2).
 
-Under every contact law (`scene/flat_landing.py`) the force is linear in depth and speed wherever it is not zero. The closed
-forms (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
+Under every contact law (`scene/flat_landing.py`) the force is linear in depth and speed wherever it is not zero. The
+closed forms (`exact`, `event`, fast-forward, the flat bounce) take it for S d − D u there.
 """
 
 from __future__ import annotations

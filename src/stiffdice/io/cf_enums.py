@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _FLAGS = ("flag_values", "flag_meanings")
 
@@ -35,5 +37,5 @@ def labelled(dataset: xr.Dataset) -> xr.Dataset:
     for name, part in dataset.variables.items():
         if _FLAGS[1] in part.attrs:
             attributes = {key: value for key, value in part.attrs.items() if key not in _FLAGS}
-            words[str(name)] = xr.Variable(part.dims, np.array(meanings_of(part))[part.values], attributes)
+            words[str(name)] = part.dims, np.array(meanings_of(part))[part.values], attributes
     return dataset.assign(words)

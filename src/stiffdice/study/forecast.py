@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from stiffdice.dynamics.compilation import cache_folder
 from stiffdice.study import outputs
 from stiffdice.study.catalogue import DRAWINGS
 from stiffdice.study.config import Study
@@ -102,8 +103,7 @@ def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
 def seconds(study: Study) -> dict[Result, float]:
     """Return how long the job of each result of a study takes [s], on a core of the machine that `cost` is of."""
     found, compiled = dict[Result, float](), set[tuple[str, ...]]()
-    # A loop of runs lies in the folder that `dynamics.compilation` has chosen.
-    cold = not any(Path(os.environ.get("NUMBA_CACHE_DIR", "")).glob("simulation_*/*._march-*.nbc"))
+    cold = not any(cache_folder().glob("simulation_*/*._march-*.nbc"))  # without a loop of runs
     for result in outputs.of(study):
         work, kinds = _work(study, result)
         found[result] = _JOB[result.stage] + _STARTING + work

@@ -18,17 +18,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import groupby, pairwise
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.sweep import cost_model
 from stiffdice.sweep.grid import Piece, Sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Of predicted work: what a job gets [s], and what it gets of a sweep too small for so many jobs, but no less than that.
 SECONDS, JOBS, FEWEST_SECONDS = 120.0, 16, 4.0

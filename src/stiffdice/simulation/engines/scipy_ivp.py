@@ -114,7 +114,7 @@ def equations(model: str) -> tuple[Slope, Slopes]:
             there[j] = y[j]
         return jacobian
 
-    return slope, slopes
+    return slope.dispatcher, slopes.dispatcher
 
 
 @njit(cache=True)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.compilation import KernelFiles
+from stiffdice.dynamics.compiler import KernelFiles
 
 ROOT = Path(__file__).parents[2]
 KERNEL = {"code": bytes(range(256))}
@@ -88,7 +88,7 @@ def test_a_link_in_its_place_goes_and_what_it_points_at_stays(kernels, tmp_path_
 TWO = """
 import sys
 from pathlib import Path
-from stiffdice.dynamics.compilation import KernelFiles
+from stiffdice.dynamics.compiler import KernelFiles
 kernels = KernelFiles(Path(sys.argv[1]), "march", "stamp")
 for k in range(400):
     if k % 7 == 0:
@@ -181,7 +181,7 @@ def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
     assert not list(tmp_path.rglob("*.nbc"))
 
 
-CHOSEN = "import os, stiffdice.dynamics.compilation; print(os.environ['NUMBA_CACHE_DIR'])"
+CHOSEN = "import os, stiffdice.dynamics.compiler; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
 def chosen(folder, **places):
