@@ -1,4 +1,4 @@
-"""What numba compiles, and in which folder that is kept on disk; numba itself comes with `compiler.py`, once it does so.
+"""What numba compiles, and in which folder that is kept on disk. Numba itself comes with `compiler.py`, when it does.
 
 Numba looks only at the file of a cached function, not at those it imports: edit a contact law, and a cached kernel
 would keep the old physics. So the folder of the cache carries a digest of all sources of the simulation, and the
