@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
+import numba
 import numpy as np
 
 from benchmarks.case import Case, Effort
@@ -92,7 +93,7 @@ LATENCIES: dict[str, Callable[..., float]] = {
 }
 
 
-@njit(fastmath={"contract"})
+@numba.njit(error_model="numpy", fastmath={"contract"})
 def _fused_in_parallel(x: Any, a: float, b: float, rounds: int) -> None:
     """Take multiply-adds with every element of x; not cached on disk, so that its machine code can be looked at."""
     for _ in range(rounds):

@@ -50,15 +50,16 @@ def follow(
     shown = _Shown()
     environment = {**environment, EVERY: "1"} if shown.is_terminal else environment
     pipe = {"stderr": subprocess.PIPE, "text": True, "errors": "replace"}
-    with subprocess.Popen(command, cwd=folder, env=environment, preexec_fn=tied, **pipe) as process:  # noqa: PLW1509
-        reader = threading.Thread(target=shown.take, args=[process.stderr], daemon=True)
-        reader.start()
-        try:
-            process.wait()
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            reader.join(1.0)  # not for ever: a job that outlives Snakemake has its standard error, too
-            shown.clear()
+    process = subprocess.Popen(command, cwd=folder, env=environment, preexec_fn=tied, **pipe)  # noqa: PLW1509
+    reader = threading.Thread(target=shown.take, args=[process.stderr], daemon=True)
+    reader.start()
+    try:
+        process.wait()
+    except BaseException:
+        process.kill()
+        raise
+    finally:
+        # Not for ever, and without closing the pipe: a job that outlives Snakemake has it, too, for a moment.
+        reader.join(1.0)
+        shown.clear()
     return process.returncode, "".join(shown.withheld)

@@ -190,7 +190,7 @@ def main() -> int:
     jobs = jobs_since(begun, studies)
     if status:
         failed = ending.told(ROOT, begun, studies)
-        if ending.FAILED not in failed:
+        if ending.FAILED not in failed and re.search("error|exception", withheld, re.IGNORECASE):
             print(withheld, end="", file=sys.stderr, flush=True)
         print(failed, flush=True)
         return status

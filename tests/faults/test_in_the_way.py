@@ -34,7 +34,7 @@ def test_a_result_that_is_a_link_to_nowhere_is_one_line(undisturbed, tmp_path):
     assert told in status(project).stdout
     done = project.run()
     assert done.returncode == 2
-    assert f"\nstiffdice: {told}\n" in done.stderr and "Traceback" not in done.stderr
+    assert f"stiffdice: {told}\n" in done.stderr and "Traceback" not in done.stderr
     figure.unlink()
     assert project.run().returncode == 0
     assert project.data() == undisturbed.data()
