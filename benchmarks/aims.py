@@ -103,7 +103,8 @@ def reached(bench: xr.Dataset) -> list[Reached]:
 
 def _ratio(bench: xr.Dataset, aim: Aim) -> Reached:
     aimed = f"at least {aim.at_least:g}" if aim.at_least else ""
-    if aim.over not in bench or aim.under not in bench:
+    counted = not aim.share or "floating_point_operations" in bench.get(aim.under, xr.DataArray()).attrs
+    if aim.over not in bench or aim.under not in bench or not counted:
         return Reached(aim.what, "1", aimed, math.nan, math.nan, None)
     over = samples_of(bench, aim.over)
     if aim.share:
