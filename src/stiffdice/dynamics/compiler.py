@@ -136,8 +136,8 @@ class _Kernel(_Dispatcher):  # type: ignore[misc]
 class _Part(_Dispatcher):  # type: ignore[misc]
     """A compiled function that is meant for compiled code, without machine code and wrappers for calls from Python.
 
-    Those are a third of all time to compile, and more. Who does call it from Python, a test, say, has a kernel made for the call;
-    numba's own would jump to nowhere.
+    Those are a third of all time to compile, and more. Who does call it from Python, a test, say, has a kernel made for
+    the call; numba's own would jump to nowhere.
     """
 
     def compile(self, sig: Any) -> Any:
