@@ -6,7 +6,7 @@ import time
 import pytest
 
 from stiffdice.cli import progress
-from stiffdice.dynamics import compilation
+from stiffdice.dynamics import kernel_cache
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_what_takes_long_is_said_once(monkeypatch, capsys, quiet, told):
 
 def test_compiling_is_said_once(capsys):
     with progress.progress("event"):
-        tell = compilation.TELLING.get()
+        tell = kernel_cache.TELLING.get()
         tell(), tell()
     assert capsys.readouterr().err == "compiling the kernels of event, once; about 12 s\n"
-    assert compilation.TELLING.get() is None
+    assert kernel_cache.TELLING.get() is None

@@ -23,7 +23,7 @@ import numba
 from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, serialize, typed_passes
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
 
-from stiffdice.dynamics.compilation import LOADING, TELLING, NotStoredError, cache_folder
+from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder
 
 # In the environment for child processes and for numba to find when it reads it again.
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
