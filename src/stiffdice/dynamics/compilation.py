@@ -10,12 +10,14 @@ from typing import Any
 class Compiled:
     """A function that numba compiles. Numba is imported once it is called, or taken into another that is.
 
-    bodies: by the type of the first argument, of a function that calls one of them with the others. options: numba's.
+    bodies: by the type of the first argument, of a function that calls one of them with the others. options: numba's,
+    in place of those that all have.
     """
 
     def __init__(self, function: Callable[..., Any], bodies: dict[type, Any] | None, options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.py_func, self._bodies, self._options = function, bodies, options
+        self.py_func, self._bodies = function, bodies
+        self._options = {"error_model": "numpy", "fastmath": False, "nopython": True} | options
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -55,7 +57,7 @@ def njit(function: Any = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(njit, **options)
-    return Compiled(function, None, {"error_model": "numpy", "fastmath": False, "nopython": True} | options)
+    return Compiled(function, None, options)
 
 
 def constant(value: Any) -> Any:
@@ -66,14 +68,13 @@ def constant(value: Any) -> Any:
 def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
     """Return a function, for compiled code only, that calls the body which the type of its first argument stands for.
 
-    The first argument is a tag: an empty named tuple that stands for a model or a scheme. The body,
-    which gets the arguments after it, is chosen at compile time, which costs nothing in a loop; unlike functions passed
-    as arguments it leaves the kernel cacheable on disk, and unlike string literals it does not slow down every call of
-    it (1 µs against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
+    The first argument is a tag: an empty named tuple that stands for a model or a scheme. The body, which gets the
+    arguments after it, is chosen at compile time, which costs nothing in a loop; unlike functions passed as arguments
+    it leaves the kernel cacheable on disk, and unlike string literals it does not slow down every call of it (1 µs
+    against 11 ms, numba 0.68). inlined: put what chooses into its caller, whatever its size.
     """
 
     def call(tag: Any, *arguments: Any) -> Any:
         raise TypeError("chosen by the type of the tag")
 
-    options = {"error_model": "numpy", "fastmath": False, "nopython": True, "forceinline": inlined}
-    return Compiled(call, bodies, options)
+    return Compiled(call, bodies, {"forceinline": inlined})
