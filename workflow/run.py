@@ -30,8 +30,8 @@ import room  # noqa: E402
 from job import ADDRESS  # noqa: E402
 
 from stiffdice.errors import printable  # noqa: E402
+from stiffdice.io.process import end_with_parent  # noqa: E402
 from stiffdice.study import job_log  # noqa: E402
-from stiffdice.study.process import end_with_parent  # noqa: E402
 
 # Of Snakemake, at most: what is made again because it was damaged may show that another result was.
 ROUNDS = 4

@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT / "workflow" / "scripts"), str(ROOT / "src")]
 import job  # noqa: E402
 
 from stiffdice.errors import StiffdiceError  # noqa: E402
-from stiffdice.study.process import end_with_parent  # noqa: E402
+from stiffdice.io.process import end_with_parent  # noqa: E402
 
 _MODULES = (
     *("stiffdice.simulation.dataset", "stiffdice.simulation.energy_budget", "stiffdice.sweep.shard"),

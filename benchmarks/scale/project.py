@@ -16,9 +16,9 @@ import yaml
 from benchmarks.processes import environment
 from benchmarks.scale import peak
 from stiffdice.errors import InputError, StiffdiceError
+from stiffdice.io.process import end_with_parent
 from stiffdice.study import config as studies
 from stiffdice.study.config import Study
-from stiffdice.study.process import end_with_parent
 
 _PROFILE = "workflow/profiles/default"
 _SCHEMA = "workflow/schemas/study.schema.yaml"

@@ -22,7 +22,7 @@ NUMBERS = ["--contact", "gated", "--spin", "0.3,0.5,0.2", "--duration", "3", "--
 def test_numbers_in_place_of_a_file_and_the_answer_for_people(capsys):
     status, out, err = called(capsys, "--stiffness", "1e6", "--mass", "0.5", *NUMBERS, "--error", "0.1%")
     assert status == 0
-    assert err == ""
+    assert all(line.startswith("advise: trying") for line in err.splitlines())  # of a slow machine
     for words in ("model     tumbling: the cube spins", "scheme    event, tolerance 1e-0", "0.001 asked", "root mean"):
         assert words in out
     for words in ("run time  about", "margin    none needed", "evidence  measured: "):

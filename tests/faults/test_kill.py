@@ -262,9 +262,7 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="other systems have n
 
 @linux
 def test_a_process_ends_with_its_parent():
-    child = (
-        "from stiffdice.study.process import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
-    )
+    child = "from stiffdice.io.process import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
     started = subprocess.Popen([sys.executable, "-c", parent], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert started.stdout.readline() == b"1\n"
@@ -279,7 +277,7 @@ def test_a_process_ends_with_its_parent():
 @linux
 def test_a_process_whose_parent_is_gone_already_does_not_begin(tmp_path):
     child = (
-        "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.study.process import end_with_parent\n"
+        "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.io.process import end_with_parent\n"
         "while os.getppid() == int(sys.argv[1]): time.sleep(0.01)\n"
         "Path('told').write_text(f'{os.getpid()} {os.getppid()} \\n')\n"
         "end_with_parent('no such program')\nPath('begun').touch()"

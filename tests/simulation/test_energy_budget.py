@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice.dynamics import code_digest, energy
+from stiffdice.dynamics import energy
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import TOUCHING, physics_of
 from stiffdice.errors import InputError
@@ -57,7 +57,7 @@ def paper(preset, **ground):
 def ledger(scene, **options):
     """The ledger's numbers as attributes."""
     found = energy_budget.ledger(scene, **options)
-    return SimpleNamespace(steps_done=found.steps_done, **{name: part.values for name, part in found.items()})
+    return SimpleNamespace(**found.attrs, **{name: part.values for name, part in found.data_vars.items()})
 
 
 def change(kept, part=""):
@@ -332,7 +332,9 @@ def test_a_runs_file_takes_the_ledger(tmp_path, duration, bounces):
     for name, variable in found.variables.items():
         assert variable.attrs["units"], name
         assert variable.attrs["long_name"], name
-    np.testing.assert_allclose(found.bounce_end, kept.bounce_last_step * duration / 1_000, rtol=1e-14)
+    np.testing.assert_allclose(
+        found.bounce_end, kept.data_vars["bounce_last_step"].values * duration / 1_000, rtol=1e-14
+    )
     parts = ("damping_work", "drag_work", "friction_work", "scheme_work")
     assert float(sum(found[name] for name in parts)) == pytest.approx(
         float(found.end_energy - found.launch_energy), abs=1e-12
@@ -347,22 +349,6 @@ def test_a_runs_file_takes_the_ledger(tmp_path, duration, bounces):
 def test_unknown_names_and_counts_are_refused(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         ledger(rough("gated"), **wrong)
-
-
-def sources(module):
-    """The files of the package that a module imports, and those that these import."""
-    found, waiting = set(), {code_digest._path(module)}
-    while waiting:
-        path = waiting.pop()
-        found.add(path)
-        waiting |= {code_digest._path(name) for name in code_digest._imports(path)} - found - {None}
-    return {path.relative_to(code_digest.PACKAGE).as_posix() for path in found}
-
-
-def test_the_cache_folder_knows_all_that_the_kernel_stands_on():
-    """Its name digests the sources of `simulate`; numba itself looks at files that have kernels of their own."""
-    ours, simulations = map(sources, ("stiffdice.simulation.energy_budget", "stiffdice.simulation.run"))
-    assert ours - simulations == {"simulation/energy_budget.py", "io/cf_enums.py"}  # enums are not compiled
 
 
 def test_a_scheme_with_steps_of_its_own_has_no_ledger():

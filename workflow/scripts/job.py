@@ -7,6 +7,7 @@ jobs need, and waits for it. Without such a process, as on a cluster, it does th
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import os
 import pickle
@@ -81,9 +82,10 @@ def begin(script: str, snakemake: Any) -> NoReturn:
     )
     status = _hand_over(job)
     if status is None:
-        from stiffdice.study.process import end_with_parent
+        from stiffdice.io.process import end_with_parent
 
         end_with_parent("snakemake")
+        gc.set_threshold(50_000)  # what is imported stays
         carry_out(job)
     os._exit(status)
 

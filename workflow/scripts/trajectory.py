@@ -9,7 +9,7 @@ def make(job: Job, say: Say) -> None:
     from stiffdice.scene import scene as scenes
     from stiffdice.simulation import energy_budget
     from stiffdice.simulation.backend import OURS
-    from stiffdice.simulation.dataset import run_dataset
+    from stiffdice.simulation.dataset import plain_run_dataset
     from stiffdice.simulation.run import simulate
 
     planned, preset = job.plan(), job.wildcards["preset"]
@@ -24,7 +24,7 @@ def make(job: Job, say: Say) -> None:
             steps=planned.steps,
             every=planned.every,
         )
-        dataset = run_dataset(run, f"{job.wildcards['run']}, {preset.replace('_', ' ')}")
+        dataset = plain_run_dataset(run, f"{job.wildcards['run']}, {preset.replace('_', ' ')}")
         if planned.simulator == OURS and planned.scheme in energy_budget.BOOKED:
             ledger = energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=planned.steps)
             dataset = dataset.assign(ledger.data_vars)

@@ -116,9 +116,9 @@ def call(options: argparse.Namespace) -> int:
             check = checked(given, run, show)
         if target is not None:
             from stiffdice.io.writer import write_dataset
-            from stiffdice.simulation.dataset import run_dataset
+            from stiffdice.simulation.dataset import plain_run_dataset
 
-            write_dataset(run_dataset(run), target)
+            write_dataset(plain_run_dataset(run), target)
     if options.json:
         print(advice_page.as_json(given, check))
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from concurrent.futures import ThreadPoolExecutor
 
 HELP = "say what a file holds: its verdict, its scene, its variables"
 EXAMPLES = """\
@@ -24,9 +25,12 @@ def add(inspect: argparse.ArgumentParser) -> None:
 def call(options: argparse.Namespace) -> None:
     """Print what the file holds."""
     from stiffdice.io import isolation
-    from stiffdice.io.reader import open_file
-    from stiffdice.report import file_page
 
-    isolation.admit(options.file)
-    dataset = open_file(options.file)
+    with ThreadPoolExecutor(1) as another:
+        admitted = another.submit(isolation.admit, options.file)
+        from stiffdice.io.reader import plain_file  # in the meantime
+        from stiffdice.report import file_page
+
+        admitted.result()
+    dataset = plain_file(options.file)
     print(file_page.as_json(dataset) if options.json else file_page.as_text(dataset, options.file))

@@ -69,7 +69,7 @@ def call(options: argparse.Namespace) -> None:
     from stiffdice.io.writer import write_dataset
     from stiffdice.report import run_page
     from stiffdice.simulation import backend, energy_budget
-    from stiffdice.simulation.dataset import run_dataset
+    from stiffdice.simulation.dataset import plain_run_dataset
     from stiffdice.simulation.run import default_every, simulate
 
     setup = backend.setup_of(scene, options.model, options.simulator, options.scheme, steps)
@@ -95,7 +95,7 @@ def call(options: argparse.Namespace) -> None:
             budget=budget,
             progress=show,
         )
-    dataset = run_dataset(run)
+    dataset = plain_run_dataset(run)
     if options.ledger:
         done = int(run.steps_done[0])
         ledger = energy_budget.ledger(scene, model=run.model, scheme=run.scheme, steps=steps, budget=done)

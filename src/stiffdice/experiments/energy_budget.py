@@ -43,10 +43,10 @@ def measure(
     missing = np.full(validation.count("bounces", bounces), np.nan)
 
     def works(law: str, count: int) -> list[Any]:
-        ledger = energy_budget.ledger(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=count)
+        ledger = energy_budget.ledger(scene.with_ground(contact=law), model=model, scheme=SCHEME, steps=count).data_vars
         of_bounces = [name for name, (_, _, *bounce) in _WORKS.items() if bounce]
         found = [np.append(ledger[f"bounce_{name}"].values, missing)[:bounces] for name in of_bounces]
-        return [*found, float(ledger["flight_drag_work"])]
+        return [*found, float(ledger["flight_drag_work"].values)]
 
     found = mapped(works, _WORKS, contact=CONTACT_LAWS, steps=taken) | coordinates(bounce=range(1, bounces + 1))
     omega_h = [linear_theory.omega_h(scene, count) for count in taken]

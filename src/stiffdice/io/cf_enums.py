@@ -10,6 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    from stiffdice.io.plain_dataset import PlainVariable
+
 _FLAGS = ("flag_values", "flag_meanings")
 
 
@@ -23,7 +25,7 @@ def enum_attributes(long_name: str, meanings: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def meanings_of(variable: xr.DataArray | xr.Variable) -> list[str]:
+def meanings_of(variable: xr.DataArray | xr.Variable | PlainVariable) -> list[str]:
     """Return what the values 0, 1, ... of an enum mean."""
     return str(variable.attrs["flag_meanings"]).split()
 

@@ -18,10 +18,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from stiffdice.errors import InputError, RefusedError
-from stiffdice.io.structure_check import check_values, opened, told
 
 SECONDS = 60  # of processor time that a file may take
 PATIENCE = 5  # times as long on the clock, of a machine with other things to do
@@ -85,6 +82,10 @@ def _limit(seconds: int) -> None:
 
 def _serve() -> None:
     """Answer for each file with what is wrong, once every value was read, a piece at a time."""
+    import numpy as np  # and all else that takes time to import: who starts this process needs none of it
+
+    from stiffdice.io.structure_check import check_values, opened, told
+
     print("ready", flush=True)
     for path in json.load(sys.stdin):
         _limit(SECONDS)

@@ -7,23 +7,33 @@ from contextlib import ExitStack
 from itertools import chain
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io import isolation
 from stiffdice.io.cf_enums import labelled
+from stiffdice.io.plain_dataset import PlainDataset, PlainVariable
 from stiffdice.io.structure_check import Contents, check_values, opened, told
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Of a file of runs about so many are in memory at a time; a run takes some 130 bytes.
 RUNS_AT_ONCE = 1 << 14
 
 
 def open_file(path: str | Path) -> xr.Dataset:
+    """Return the dataset in a file of ours, loaded; raises InputError as `plain_file` does."""
+    import xarray as xr
+
+    return xr.Dataset(*plain_file(path))
+
+
+def plain_file(path: str | Path) -> PlainDataset:
     """Return the dataset in a file of ours, loaded; raises InputError, naming the file, if it cannot be trusted.
 
     What is not ours is refused before a value is read (`io.structure_check`), damage by its seal. A file from elsewhere
@@ -57,6 +67,8 @@ def parts(path: str | Path, cells: int | None = None) -> Iterator[xr.Dataset]:
     By default so many cells that a part holds about RUNS_AT_ONCE runs: what is in memory does not grow with the file,
     and what a part costs by itself is little beside its runs.
     """
+    import xarray as xr
+
     with ExitStack() as stack:
         with told(path):
             file, contents = stack.enter_context(opened(path))
@@ -75,9 +87,8 @@ def parts(path: str | Path, cells: int | None = None) -> Iterator[xr.Dataset]:
         count = cells or together * max(1, RUNS_AT_ONCE // (together * max(1, sizes.get("member", 1))))
         for first in range(0, sizes["cell"], count):
             with told(path):
-                part = _dataset(
-                    contents, others | {k: _values(file, contents, k, first, first + count) for k in growing}
-                )
+                found = others | {k: _values(file, contents, k, first, first + count) for k in growing}
+                part = xr.Dataset(*_dataset(contents, found))
             yield part
 
 
@@ -112,9 +123,9 @@ def _values(file: h5py.File, contents: Contents, name: str, first: int = 0, end:
     return found
 
 
-def _dataset(contents: Contents, found: Mapping[str, np.ndarray]) -> xr.Dataset:
+def _dataset(contents: Contents, found: Mapping[str, np.ndarray]) -> PlainDataset:
     """Return checked values as what their file says they are."""
     known = {name: variable for name, variable in contents.variables.items() if name in found}
-    made = {name: xr.Variable(part.dimensions, found[name], part.attributes) for name, part in known.items()}
+    made = {name: PlainVariable(part.dimensions, found[name], part.attributes) for name, part in known.items()}
     coordinates = {name: made.pop(name) for name, part in known.items() if part.is_coordinate}
-    return xr.Dataset(made, coordinates, contents.attributes)
+    return PlainDataset(made, coordinates, contents.attributes)

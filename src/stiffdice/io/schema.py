@@ -6,13 +6,16 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from stiffdice.io.cf_enums import enum_attributes
+from stiffdice.io.plain_dataset import PlainDataset, PlainVariable
 from stiffdice.io.structure_check import FORMAT_VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # How much a reader may count on something.
 REQUIRED, RECOMMENDED, OPTIONAL = "required", "recommended", "optional"
@@ -260,6 +263,15 @@ def attributes_of(kind: str, name: str, meanings: Sequence[str] | None = None) -
 def dataset(
     kind: str, values: Mapping[str, Any], meanings: Mapping[str, Sequence[str]], attributes: Mapping[str, Any]
 ) -> xr.Dataset:
+    """Return a dataset of one kind; arguments as of `plain_dataset`."""
+    import xarray as xr
+
+    return xr.Dataset(*plain_dataset(kind, values, meanings, attributes))
+
+
+def plain_dataset(
+    kind: str, values: Mapping[str, Any], meanings: Mapping[str, Sequence[str]], attributes: Mapping[str, Any]
+) -> PlainDataset:
     """Return a dataset of one kind.
 
     values: of each variable by name, in the order in which they are stored; a tuple (dimensions, values, attributes)
@@ -267,13 +279,13 @@ def dataset(
     """
     known = KINDS[kind].variables
     variables = {
-        name: given
+        name: PlainVariable(given[0], np.asarray(given[1]), given[2])
         if isinstance(given, tuple)
-        else (known[name].dimensions, given, attributes_of(kind, name, meanings.get(name)))
+        else PlainVariable(known[name].dimensions, np.asarray(given), attributes_of(kind, name, meanings.get(name)))
         for name, given in values.items()
     }
     coordinates = {name: variables.pop(name) for name in values if name in known and COORDINATE in known[name].role}
-    return xr.Dataset(variables, coordinates, attributes)
+    return PlainDataset(variables, coordinates, attributes)
 
 
 def problems(dataset: xr.Dataset) -> list[str]:

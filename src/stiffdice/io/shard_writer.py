@@ -6,16 +6,18 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5netcdf
 import h5py
 import numpy as np
-import xarray as xr
 
 from stiffdice.errors import OutputError
 from stiffdice.io import seal
-from stiffdice.io.writer import check_target, store, temporary_of
+from stiffdice.io.writer import check_target, define, store, temporary_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Of one chunk: small enough that a block of members or a handful of cells fills it, large enough to compress. Of fewer
 # members it holds more cells, as many runs in all: a file has the fewer chunks.
@@ -64,12 +66,7 @@ class Spool:
             if dimension not in netcdf.dimensions:
                 netcdf.dimensions[str(dimension)] = size
         chunks = tuple(sizes.get(str(dimension), size) for dimension, size in variable.sizes.items())
-        packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
-        stored = netcdf.create_variable(name, variable.dims, variable.dtype, chunks=chunks, **packed)
-        stored.attrs.update(variable.attrs)
-        labels = [str(label) for label in self._pattern.coords if label not in self._pattern.dims]
-        if name in self._pattern.data_vars and labels:
-            stored.attrs["coordinates"] = " ".join(labels)  # so that readers take them for such (CF)
+        stored = define(netcdf, self._pattern, name, chunks)
         if "cell" not in variable.dims:
             stored[...] = variable.values
 

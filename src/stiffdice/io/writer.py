@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import xarray as xr
+import h5netcdf
 
 from stiffdice.errors import OutputError
 from stiffdice.io import host, seal
+from stiffdice.io.plain_dataset import PlainDataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
 
 
 def check_target(path: str | Path) -> Path:
@@ -97,7 +105,7 @@ def store(temporary: Path, target: Path) -> None:
             os.close(folder)
 
 
-def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
+def write_dataset(dataset: PlainDataset | xr.Dataset, path: str | Path) -> None:
     """Store a dataset as netCDF-4 on HDF5.
 
     dataset: as `run_dataset` returns it. path: of the file, which is replaced as a whole or left as it was. The file is
@@ -106,15 +114,35 @@ def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
 
     Raises OutputError if it cannot be stored.
     """
-    # Missing values are NaN here; a _FillValue would say so twice, and coordinates must have none.
-    unfilled = {"_FillValue": None}
-    packed = {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
-    encoding = {
-        str(name): (unfilled if variable.dtype.kind == "f" else {}) | (packed if variable.size > 1 else {})
-        for name, variable in dataset.variables.items()
-    }
+    image = io.BytesIO()
     try:
-        image = memoryview(dataset.to_netcdf(None, engine="h5netcdf", encoding=encoding))
+        with h5netcdf.File(image, "w") as file:
+            file.attrs.update(dataset.attrs)
+            file.dimensions = {str(name): length for name, length in dataset.sizes.items()}
+            for name, variable in dataset.variables.items():
+                define(file, dataset, str(name))[...] = variable.values
     except OSError as error:  # in memory, but what makes it may have to be loaded first
         raise OutputError(f"{path}: {error.strerror or error}; nothing was stored") from None
-    write_bytes(image, path, seal.line_of(image))
+    data = image.getbuffer()
+    write_bytes(data, path, seal.line_of(data))
+
+
+def define(
+    file: h5netcdf.File, dataset: PlainDataset | xr.Dataset, name: str, chunks: tuple[int, ...] | None = None
+) -> h5netcdf.Variable:
+    """Return a variable of a dataset, made in an open file with its attributes, and without values.
+
+    chunks: their lengths along the axes; None lets HDF5 choose, and stores a single value as it is.
+    """
+    variable = dataset.variables[name]
+    packed = _PACKED if chunks is not None or variable.values.size > 1 else {}
+    made = file.create_variable(name, variable.dims, variable.values.dtype, chunks=chunks, **packed)
+    made.attrs.update(variable.attrs)
+    labels = {
+        str(label)
+        for label, part in dataset.coords.items()
+        if label not in part.dims and set(part.dims) <= set(variable.dims)
+    }
+    if name in dataset.data_vars and labels:
+        made.attrs["coordinates"] = " ".join(sorted(labels))  # so that readers take them for such (CF)
+    return made

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 import yaml
 
 from stiffdice.errors import printable
 from stiffdice.io.cf_enums import meanings_of
+from stiffdice.io.plain_dataset import PlainDataset
 from stiffdice.report.markdown_table import aligned
 from stiffdice.report.number_format import finite
 from stiffdice.simulation.outcome import Verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LONG = (
     *("title", "Conventions", "history", "source", "references", "scene"),
@@ -27,22 +30,22 @@ _OF_BOUNCES = tuple(f"bounce_{part}" for part in ("start", "damping_work", "drag
 SHOWN = 10
 
 
-def as_text(dataset: xr.Dataset, name: str) -> str:
+def as_text(dataset: PlainDataset | xr.Dataset, name: str) -> str:
     """Return a page on a dataset: what it is, its verdict, its scene, its variables with units."""
-    attributes = dataset.attrs
+    attributes, variables = dataset.attrs, dataset.variables
     lines = [f"{name}: {attributes.get('title', 'untitled')}", ""]
     lines += [f"  {key}: {_plain(value)}" for key, value in attributes.items() if key not in _LONG]
     lines += ["", "verdict", *_verdicts(dataset)]
     if "scene" in attributes:
         scene = yaml.safe_dump(json.loads(attributes["scene"]), sort_keys=False, default_flow_style=None, width=100)
         lines += ["", "scene", *(f"  {line}" for line in scene.splitlines())]
-    if all(name in dataset and dataset[name].ndim == 0 for name in (*_BOOKED, "bounce_count")) and all(
-        name in dataset and dataset[name].dims == ("bounce",) for name in _OF_BOUNCES
-    ):
+    dimensions = dict.fromkeys((*_BOOKED, "bounce_count"), ()) | dict.fromkeys(_OF_BOUNCES, ("bounce",))
+    if all(name in variables and variables[name].dims == dims for name, dims in dimensions.items()):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
     rows = []
-    for key, variable in dataset.variables.items():
-        sizes = " × ".join(f"{size} {dim}" for dim, size in variable.sizes.items()) or "one value"
+    for key, variable in variables.items():
+        shape = zip(variable.values.shape, variable.dims, strict=True)
+        sizes = " × ".join(f"{size} {dim}" for size, dim in shape) or "one value"
         rows.append((str(key), sizes, f"[{variable.attrs.get('units', '?')}]", variable.attrs.get("long_name", "")))
     lines += ["", "variables", *aligned(rows)]
     return "\n".join(map(printable, lines))
@@ -53,7 +56,7 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-def _verdicts(dataset: xr.Dataset) -> list[str]:
+def _verdicts(dataset: PlainDataset | xr.Dataset) -> list[str]:
     counts = _verdict_counts(dataset)
     total = sum(counts.values())
     if not total:
@@ -63,42 +66,47 @@ def _verdicts(dataset: xr.Dataset) -> list[str]:
     (name,) = counts
     measures = []
     for measure, variable in dataset.data_vars.items():
-        if variable.ndim == 0 and str(measure).endswith(("_ratio", "_error", "_phase")):
-            found = f" = {float(variable):.6g}: {variable.attrs['long_name']}"
-            none = measure == "apex_ratio" and not float(variable)
+        if not variable.dims and str(measure).endswith(("_ratio", "_error", "_phase")):
+            found = f" = {variable.values:.6g}: {variable.attrs['long_name']}"
+            none = measure == "apex_ratio" and not variable.values
             measures.append(f"  {measure}{': no rebound to compare with the one before' if none else found}")
     # A later version may have verdicts of other names.
     return [f"  {Verdict[name.upper()].sentence if name.upper() in Verdict.__members__ else name}", *measures]
 
 
-def _ledger(dataset: xr.Dataset) -> list[str]:
+def _ledger(dataset: PlainDataset | xr.Dataset) -> list[str]:
     """Return where the energy of a run went, a line each."""
-    lines = [f"  {name:14} {float(dataset[name]):+12.6g} J" for name in _BOOKED]
-    lines.append(f"  in {int(dataset.bounce_count)} bounces and the flights between them; the first of them:")
+    variables = dataset.variables
+    bounces = int(variables["bounce_count"].values)
+    lines = [f"  {name:14} {variables[name].values:+12.6g} J" for name in _BOOKED]
+    lines.append(f"  in {bounces} bounces and the flights between them; the first of them:")
     units = [f"{name.removeprefix('bounce_')} [{'s' if name == 'bounce_start' else 'J'}]" for name in _OF_BOUNCES]
-    values = zip(*(dataset[name].values[:SHOWN] for name in _OF_BOUNCES), strict=True)
+    values = zip(*(variables[name].values[:SHOWN] for name in _OF_BOUNCES), strict=True)
     return [*lines, *aligned([units, *([f"{value:.6g}" for value in row] for row in values)])]
 
 
-def _verdict_counts(dataset: xr.Dataset) -> dict[str, int]:
+def _verdict_counts(dataset: PlainDataset | xr.Dataset) -> dict[str, int]:
     """Return how many runs ended with each verdict, those that none ended with left out; nothing if it holds no runs.
 
     In a judged sweep `verdict` is a coordinate, and how many runs ended so in each cell is in `verdicts`.
     """
-    if "verdict" not in dataset or "flag_meanings" not in dataset.verdict.attrs:
+    variables = dataset.variables
+    verdict, counted = variables.get("verdict"), variables.get("verdicts")
+    if verdict is None or "flag_meanings" not in verdict.attrs:
         return {}
-    names = meanings_of(dataset.verdict)
-    if "verdict" not in dataset.dims:
-        counts = np.bincount(dataset.verdict.values.astype(int).ravel(), minlength=len(names))
-    elif "verdicts" in dataset:
-        counts = dataset.verdicts.sum([dim for dim in dataset.verdicts.dims if dim != "verdict"]).values
-        names = [names[value] for value in dataset.verdict.values]
+    names = meanings_of(verdict)
+    if "verdict" not in dataset.sizes:
+        counts = np.bincount(verdict.values.astype(int).ravel(), minlength=len(names))
+    elif counted is not None:
+        others = tuple(axis for axis, name in enumerate(counted.dims) if name != "verdict")
+        counts = counted.values.sum(axis=others)
+        names = [names[value] for value in verdict.values]
     else:
         return {}
     return {name: int(count) for name, count in zip(names, counts, strict=True) if count}
 
 
-def as_json(dataset: xr.Dataset) -> str:
+def as_json(dataset: PlainDataset | xr.Dataset) -> str:
     """Return the same as JSON: attributes, sizes, verdicts and variables."""
     attributes = {key: _plain(value) for key, value in dataset.attrs.items()}
     if "scene" in attributes:
@@ -106,7 +114,9 @@ def as_json(dataset: xr.Dataset) -> str:
     content = {
         "attributes": attributes,
         "sizes": dict(dataset.sizes),
-        "values": {name: finite(float(variable)) for name, variable in dataset.data_vars.items() if not variable.ndim},
+        "values": {
+            name: finite(float(variable.values)) for name, variable in dataset.data_vars.items() if not variable.dims
+        },
         "verdicts": _verdict_counts(dataset),
         "variables": {
             name: {"dimensions": variable.dims, "units": variable.attrs.get("units")}

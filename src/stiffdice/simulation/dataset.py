@@ -6,10 +6,9 @@ import hashlib
 import json
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from stiffdice import __version__
 from stiffdice.dynamics import contact, linear_theory
@@ -18,6 +17,7 @@ from stiffdice.dynamics.state import TURNING
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io import schema
+from stiffdice.io.plain_dataset import PlainDataset
 from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.flat_landing import CONTACT_LAWS
@@ -26,6 +26,9 @@ from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 VERDICTS = [verdict.name.lower() for verdict in Verdict]
 VERDICT_ATTRIBUTES = schema.attributes_of("shard", "verdict", VERDICTS)
@@ -92,6 +95,13 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
 
     Raises InputError for an ensemble, and for a run whose trajectory was not kept.
     """
+    import xarray as xr
+
+    return xr.Dataset(*plain_run_dataset(run, title))
+
+
+def plain_run_dataset(run: Run, title: str = "A thrown cube") -> PlainDataset:
+    """Return the dataset of a run as `run_dataset` does, without xarray."""
     trajectory = run.trajectory
     if trajectory is None or len(run.verdict) != 1:
         raise InputError("run: has no trajectory of one launch; simulate(..., every=K) keeps one")
@@ -129,4 +139,4 @@ def run_dataset(run: Run, title: str = "A thrown cube") -> xr.Dataset:
     }
     if run.scene.derived:
         attributes["scene_derived"] = "; ".join(run.scene.derived)
-    return schema.dataset("run", values, {"axis": AXES, "verdict": VERDICTS, "ending": VERDICTS}, attributes)
+    return schema.plain_dataset("run", values, {"axis": AXES, "verdict": VERDICTS, "ending": VERDICTS}, attributes)

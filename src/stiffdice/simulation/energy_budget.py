@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from stiffdice.dynamics import energy
 from stiffdice.dynamics.compilation import njit
@@ -42,6 +41,7 @@ from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of, 
 from stiffdice.dynamics.vector import Vector, cross, plus, plus_times, row, times, vector
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.cf_enums import enum_attributes
+from stiffdice.io.plain_dataset import PlainDataset, PlainVariable
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
@@ -109,7 +109,7 @@ def ledger(
     scheme: str = "symplectic_euler",
     steps: int = 10_000,
     budget: int | None = None,
-) -> xr.Dataset:
+) -> PlainDataset:
     """Run the scene's own launch step by step and return where its energy went, as variables of a run's file.
 
     Scalars: `launch_energy` and `end_energy` [J], of the velocity at the stored place; `bounce_count`; the AMOUNTS and
@@ -142,10 +142,14 @@ def ledger(
         goes_on = count == len(sound) and done < end
     for name, step in (("start", "first_step"), ("end", "last_step")):
         rows[name] = rows[step] / setup.steps * scene.duration
-    return _dataset(launch, now, bounces, rows[:bounces], accounts.sum(axis=1)).assign_attrs(steps_done=done)
+    return PlainDataset(
+        _variables(launch, now, bounces, rows[:bounces], accounts.sum(axis=1)), {}, {"steps_done": done}
+    )
 
 
-def _dataset(launch: float, now: float, bounces: int, rows: npt.NDArray[np.void], booked: Array) -> xr.Dataset:
+def _variables(
+    launch: float, now: float, bounces: int, rows: npt.NDArray[np.void], booked: Array
+) -> dict[str, PlainVariable]:
     """Return a ledger's variables; launch, now: energies [J]."""
     described: dict[str, tuple[tuple[str, ...], Any, str, str]] = {
         "launch_energy": ((), launch, f"{_PLACE} at the launch", "J"),
@@ -156,13 +160,13 @@ def _dataset(launch: float, now: float, bounces: int, rows: npt.NDArray[np.void]
         **{f"bounce_{name}": (("bounce",), rows[name], text, unit) for name, (_, text, unit) in _COLUMNS.items()},
         **_works(("bounce",), "bounce_", booked[_BOUNCES:][:bounces], "the bounce"),
     }
-    variables: dict[str, Any] = {
-        name: (dimensions, values, {"long_name": text, "units": unit})
+    variables = {
+        name: PlainVariable(dimensions, np.asarray(values), {"long_name": text, "units": unit})
         for name, (dimensions, values, text, unit) in described.items()
     }
     ended = enum_attributes("whether the bounce was over at the last step booked", ENDED)
-    variables["bounce_ended"] = ("bounce", rows["ended"].astype(np.int8), ended)
-    return xr.Dataset(variables)
+    variables["bounce_ended"] = PlainVariable(("bounce",), rows["ended"].astype(np.int8), ended)
+    return variables
 
 
 def _works(
