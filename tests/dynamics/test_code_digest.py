@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from stiffdice.dynamics.code_digest import PACKAGE, code_digest
+from stiffdice.dynamics.code_digest import PACKAGE, _imports, code_digest
 
 
 @pytest.fixture
@@ -62,6 +63,19 @@ def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, tou
         file.write("\n# changed\n")
     after = {module: digest_of(copy, module) for module in before}
     assert {module for module in before if before[module] != after[module]} == touches
+
+
+def test_imports_are_those_that_python_finds():
+    for path in PACKAGE.rglob("*.py"):
+        names = {PACKAGE.name}
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names.update(alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        ours = [name.split(".") for name in names if name.split(".")[0] == PACKAGE.name]
+        known = {".".join(parts[:depth]) for parts in ours for depth in range(1, len(parts) + 1)}
+        assert _imports(path) | {PACKAGE.name} == known, path
 
 
 def test_digests_do_not_depend_on_where_the_code_lies(copy):

@@ -6,6 +6,7 @@ import hashlib
 import itertools
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -109,11 +110,11 @@ def test_processes_that_write_at_once_read_whole_kernels_or_none(kernels, tmp_pa
     assert {path.name for path in tmp_path.iterdir()} == names
 
 
-def run(folder, out, **changes):
-    command = ["run", "config/scenes/figure-09.yaml", "--model", "vertical", "-o", str(folder / out)]
+def run(folder, out, prefix=(), **changes):
+    scene = ["config/scenes/figure-09.yaml", "--model", "vertical", "--every", "5000"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")} | changes
     done = subprocess.run(
-        [sys.executable, "-m", "stiffdice.cli", *command],
+        [*prefix, sys.executable, "-m", "stiffdice.cli", "run", *scene, "-o", str(folder / out)],
         cwd=ROOT,
         env=environment,
         capture_output=True,
@@ -126,7 +127,7 @@ def run(folder, out, **changes):
 
 
 def cached(folder):
-    return {path: path.read_bytes() for path in sorted((folder / "cache").rglob("*")) if path.is_file()}
+    return {path: path.read_bytes() for path in sorted((folder / "cache").rglob("*.nbc")) if path.is_file()}
 
 
 @pytest.fixture(scope="module")
@@ -170,15 +171,63 @@ def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled, 
 
 
 def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
-    """What lies where a folder of kernels belongs is a file."""
-    folder, first = compiled
-    for kernels in {path.parent for path in cached(folder)}:
-        place = tmp_path / kernels.relative_to(folder)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.parent.parent.chmod(0o700)
-        place.write_text("")
-    assert run(tmp_path, "out.h5") == first
+    """No file of this process may be as long."""
+    _, first = compiled
+    assert run(tmp_path, "out.h5", ["prlimit", "--fsize=53000"]) == first
     assert not list(tmp_path.rglob("*.nbc"))
+
+
+ENERGY = """
+from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.scene.scene import from_mapping
+scene = from_mapping({})
+energies(physics_of(scene), start_of(scene, "sliding"))
+print(next(iter(energies.dispatcher.stats.cache_hits.values()), 0))
+"""
+
+
+def test_a_copy_of_the_project_finds_its_kernels(tmp_path):
+    """They are known by the digest of what they stand on, not by where that lies."""
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
+    hits = []
+    for source in (ROOT / "src", tmp_path / "src"):
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(source)}
+        command = [sys.executable, "-c", ENERGY]
+        hits.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip())
+    assert hits == ["0", "1"]
+
+
+TOGETHER = """
+import sys
+from stiffdice.dynamics import compiler
+from stiffdice.scene.scene import from_mapping
+from stiffdice.simulation.run import simulate
+
+store = compiler.KernelFiles.save
+
+def save(self, key, kernel):
+    with open(sys.argv[1], "a") as file:
+        file.write(f"{self.path(key).name}\\n")
+    store(self, key, kernel)
+
+compiler.KernelFiles.save = save
+run = simulate(from_mapping({}), model="vertical", steps=10, every=1)
+print(float(run.trajectory.state["position"][-1, 2]).hex())
+"""
+
+
+def test_what_one_process_compiles_another_waits_for(tmp_path):
+    """Two processes, each with a helper of its own, make each of the five kernels of a run once."""
+    environment, saved = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "saved"
+    command = [sys.executable, "-c", TOGETHER, str(saved)]
+    started = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    heights = {process.communicate()[0] for process in started}
+    assert [process.returncode for process in started] == [0, 0]
+    assert len(heights) == 1
+    kernels = saved.read_text().splitlines()
+    assert len(kernels) == len(set(kernels)) == 5
+    assert {path.name for path in tmp_path.rglob("*.nbc")} == set(kernels)
 
 
 CHOSEN = "import os, stiffdice.dynamics.compiler; print(os.environ['NUMBA_CACHE_DIR'])"

@@ -27,6 +27,11 @@ class Compiled:
         return compiler.dispatcher_of(self.py_func, self._bodies, self._options)
 
     @property
+    def is_compiled(self) -> bool:
+        """Whether it is compiled for any arguments, in this process."""
+        return "dispatcher" in vars(self) and bool(self.dispatcher.overloads)
+
+    @property
     def _numba_type_(self) -> Any:
         return self.dispatcher._numba_type_
 
@@ -46,6 +51,13 @@ class Intrinsic:
         from stiffdice.dynamics import compiler
 
         return compiler.type_of(getattr(self._module(), self._name))
+
+
+def compile_together(*calls: tuple[Compiled, tuple[Any, ...]]) -> None:
+    """Compile kernels for what they are about to be called with, the heaviest first, in two processes if that helps."""
+    from stiffdice.dynamics import parallel_compilation
+
+    parallel_compilation.compile_together([(kernel.dispatcher, arguments) for kernel, arguments in calls])
 
 
 def njit(function: Any = None, **options: Any) -> Any:

@@ -7,23 +7,32 @@ compiled again.
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import gc
 import hashlib
+import importlib
 import inspect
 import os
 import pickle
 import shutil
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numba
 from numba.core import codegen, compiler, compiler_machinery, dispatcher, registry, serialize, typed_passes
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvidedCacheLocator
+from numba.np import linalg
 
-from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder
+from stiffdice.dynamics.code_digest import code_digest
+from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder, only_stored
+
+# Numba imports SciPy to see whether it can multiply matrices, which our kernels do not; it looks again when one does.
+_ensure_blas, vars(linalg)["ensure_blas"] = vars(linalg)["ensure_blas"], lambda: None
+_arraymath = importlib.import_module("numba.np.arraymath")
+vars(linalg)["ensure_blas"] = vars(_arraymath)["ensure_blas"] = _ensure_blas
 
 # In the environment for child processes and for numba to find when it reads it again.
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
@@ -58,6 +67,26 @@ class KernelFiles:
         saved, kernel = pickle.loads(content[_DIGEST:])
         return kernel if saved == (self._stamp, key) else None
 
+    @contextlib.contextmanager
+    def alone(self, key: object, wait: bool) -> Iterator[bool]:
+        """Give whether no other process is in such a block for the same key; wait: until none is.
+
+        Where the file system has no locks, all are let in: each compiles for itself.
+        """
+        handle, place = _locks(), int(self.path(key).suffixes[-2][1:], 16) >> 2
+        try:
+            fcntl.lockf(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, place)
+        except (BlockingIOError, PermissionError):
+            yield False
+            return
+        except OSError:
+            yield True
+            return
+        try:
+            yield True
+        finally:
+            fcntl.lockf(handle, fcntl.LOCK_UN, 1, place)
+
     def save(self, key: object, kernel: Any) -> None:
         """Keep the kernel of a key in place of whatever is there; raises OSError if it cannot be stored."""
         path, content = self.path(key), serialize.dumps(((self._stamp, key), kernel))  # type: ignore[no-untyped-call]
@@ -71,8 +100,27 @@ class KernelFiles:
             part.unlink(missing_ok=True)
 
 
+@cache
+def _locks() -> int:
+    """Return a handle of the file whose bytes are locked: open to the end, as closing it would free all of them."""
+    return os.open(cache_folder() / "locks", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+
+
 class _Locator(UserProvidedCacheLocator):
-    """The folder chosen for kernels, and no other: the others that numba tries would serve stale kernels."""
+    """The folder chosen for kernels, and no other: the others that numba tries would serve stale kernels.
+
+    A kernel is known by the digest of its sources, wherever they lie: a copy of the project compiles nothing again.
+    """
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        super().__init__(py_func, py_file)  # type: ignore[no-untyped-call]
+        self._module, self._file = py_func.__module__, Path(py_file)
+
+    def get_cache_path(self) -> str:
+        return str(cache_folder())
+
+    def get_source_stamp(self) -> str:
+        return code_digest(self._module) + hashlib.sha256(self._file.read_bytes()).hexdigest()
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> _Locator:
@@ -100,9 +148,12 @@ class _KernelCache(FunctionCache):
         found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         if found is None and LOADING.get():
             raise NotStoredError
-        if found is None and (compiles := TELLING.get()) is not None:
-            compiles()
         return found
+
+    def alone(self, sig: Any, target_context: Any, *, wait: bool) -> contextlib.AbstractContextManager[bool]:
+        """Return a block that one process at a time is in for a signature; see `KernelFiles.alone`."""
+        key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
+        return cast(KernelFiles, self._cache_file).alone(key, wait)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled; where it cannot be stored, it serves this process alone."""
@@ -123,7 +174,24 @@ class _Kernel(_Dispatcher):  # type: ignore[misc]
     """A compiled function that Python calls."""
 
     def compile(self, sig: Any) -> Any:
-        """Compile for a signature, or load what is stored; garbage is left, as most of what that makes stays."""
+        """Compile for a signature, or load what is stored, by another process that has begun, too."""
+        with contextlib.suppress(NotStoredError), only_stored():
+            return super().compile(sig)
+        if LOADING.get():
+            raise NotStoredError
+        if (compiles := TELLING.get()) is not None:
+            compiles()
+        with self._cache.alone(sig, self.targetctx, wait=True):
+            return self._compiled(sig)
+
+    def compile_unless_begun(self, sig: Any) -> None:
+        """Compile for a signature unless another process does."""
+        with self._cache.alone(sig, self.targetctx, wait=False) as is_alone:
+            if is_alone:
+                self._compiled(sig)
+
+    def _compiled(self, sig: Any) -> Any:
+        """Compile, or load; garbage is left, as most of what that makes stays."""
         enabled = gc.isenabled()
         gc.disable()
         try:

@@ -259,7 +259,23 @@ def _march(
 
 
 def start(task: Task) -> Callable[[], bool] | None:
-    """Return what advances all members for some time and tells whether there is more to do.
+    """Return what advances all members for some time and tells whether there is more to do; None as of `march_of`."""
+    march = march_of(task)
+    if march is None:
+        return None
+    waiting = 0
+
+    def advance() -> bool:
+        nonlocal waiting
+        waiting = _march(*march[1][:-1], waiting)
+        task.members.evaluations[:] = task.members.steps_computed
+        return waiting > 0
+
+    return advance
+
+
+def march_of(task: Task) -> tuple[Any, tuple[Any, ...]] | None:
+    """Return the compiled loop and what it is called with first.
 
     None for another scheme, a model in which the ground does not act, and where numbers leave the range of doubles
     before the first step.
@@ -286,12 +302,4 @@ def start(task: Task) -> Callable[[], bool] | None:
     common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, task.limits, *energies)
     lanes = member_block.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)
-    waiting = 0
-
-    def advance() -> bool:
-        nonlocal waiting
-        waiting = _march(common, axes, members, block, inside, waiting)
-        members.evaluations[:] = members.steps_computed
-        return waiting > 0
-
-    return advance
+    return _march, (common, axes, members, block, inside, 0)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics import model_selection
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.compilation import compile_together, njit
 from stiffdice.dynamics.energy import energies, mechanical
 from stiffdice.dynamics.state import Array, Ensemble, States, start_of
 from stiffdice.errors import InputError
@@ -145,6 +145,9 @@ def simulate(
     tolerances = tolerances_of(setup.model, criteria)
     task = _task(setup, tolerance, every, members, stop, references, hop_height, budget)
     leaping = leap or (leap is None and every is None)
+    if setup.ours and not criteria_start.is_compiled:  # later runs of a process mostly need no other kernels
+        _compile(task, leaping)
+    criteria_start(task.system, task.members)
     _advance(task, leaping, progress)
     return _judged(task, tolerances)
 
@@ -180,9 +183,17 @@ def _task(
     references = empty() if references is None else references
     watched = Members(launches.copy(), sight, memory, references, samples, *np.zeros((3, count), np.int64))
     limits = Limits(setup.steps, setup.budget if budget is None else budget, every or 0, number)
-    task = Task(setup, limits, hop_height, launches, watched)
-    criteria_start(task.system, watched)
-    return task
+    return Task(setup, limits, hop_height, launches, watched)
+
+
+def _compile(task: Task, leaping: bool) -> None:
+    """Compile all that the run will call."""
+    system, members = task.system, task.members
+    march = batch_loop.march_of(task) if leaping else None
+    watch = (criteria_start, (system, members)), (finish, (system.physics, members))
+    states = members.samples
+    keep = (mechanical, (*system, states, 0.0)), (energies, (system.physics, states))
+    compile_together(march or (_march, _arguments(task, leaping)), *watch, *(keep if task.limits.every else ()))
 
 
 def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:
@@ -192,10 +203,10 @@ def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None
         backend.driver().march(task, progress)
         return
 
-    system, scheme = task.system, schemes.SCHEMES[setup.scheme]
+    arguments = _arguments(task, leaping)
 
     def stepwise() -> bool:
-        goes_on: bool = _march(scheme, system, task.members, task.limits, True if leaping else None)
+        goes_on: bool = _march(*arguments)
         return goes_on
 
     advance = (batch_loop.start(task) if leaping else None) or stepwise
@@ -204,6 +215,11 @@ def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None
         goes_on = advance()
         if progress is not None:
             progress(task.members.fraction(setup.steps, setup.step_size))
+
+
+def _arguments(task: Task, leaping: bool) -> tuple[Any, ...]:
+    """Return what `_march` takes."""
+    return schemes.SCHEMES[task.setup.scheme], task.system, task.members, task.limits, True if leaping else None
 
 
 def _judged(task: Task, tolerances: dict[str, float]) -> Run:

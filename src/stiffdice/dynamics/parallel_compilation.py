@@ -1,0 +1,77 @@
+"""Several kernels compiled at once, in as many processes: most of compiling is numba's own work in Python."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any, NoReturn
+
+from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, only_stored
+from stiffdice.io.process import end_with_parent
+
+_Due = Sequence[tuple[Any, tuple[Any, ...]]]  # kernels, each with the types of its arguments
+
+
+def compile_together(calls: _Due) -> None:
+    """Load or compile kernels for these arguments, the heaviest first.
+
+    Another process takes a part where that can be forked; what is compiled there is read from the cache on disk.
+    """
+    due = [(kernel, signature) for kernel, given in calls if (signature := _not_stored(kernel, given)) is not None]
+    with _another(due) if len(due) > 1 and _can_fork() else contextlib.nullcontext():
+        _compile_the_free(due)
+        for kernel, signature in due:
+            kernel.compile(signature)  # waits for those that the other has begun
+
+
+def _not_stored(kernel: Any, arguments: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """Load a kernel, or return the types that it is to be compiled for."""
+    signature = tuple(map(kernel.typeof_pyval, arguments))
+    try:
+        with only_stored():
+            kernel.compile(signature)
+    except NotStoredError:
+        if LOADING.get():
+            raise
+        return signature
+    return None
+
+
+def _compile_the_free(due: _Due) -> None:
+    """Compile, one after another, what no other process has begun."""
+    for kernel, signature in due:
+        kernel.compile_unless_begun(signature)
+
+
+def _can_fork() -> bool:
+    """Return whether there is a core for another process, and no thread that might hold a lock when it is forked."""
+    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 and threading.active_count() == 1
+
+
+@contextlib.contextmanager
+def _another(due: _Due) -> Iterator[None]:
+    """Let a forked process compile, too, while the block lasts."""
+    child = os.fork()
+    if child == 0:
+        _help(due)
+    try:
+        yield
+    except BaseException:
+        os.kill(child, signal.SIGKILL)
+        raise
+    finally:
+        os.waitpid(child, 0)
+
+
+def _help(due: _Due) -> NoReturn:
+    """Compile what is free, and end; what goes wrong goes wrong in the parent, too, which tells."""
+    try:
+        end_with_parent("python")
+        TELLING.set(None)
+        _compile_the_free(due)
+    finally:
+        os._exit(0)
