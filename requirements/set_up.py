@@ -20,6 +20,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -108,7 +109,7 @@ def build(root: Path, new: Path, held: int) -> None:
 
     held: a file that all that is started inherits, so that what outlives this process keeps the lock.
     """
-    pip = [*empty(new, held), "install", "--quiet", "--no-warn-script-location"]
+    pip = [*empty(new, held), "install", "--quiet", "--no-warn-script-location", "--no-compile"]
     first, second = (str(root / "requirements" / name) for name in LOCKS)
     python, old = str(new / "bin/python"), root / ".venv"
     steps = [
@@ -123,13 +124,18 @@ def build(root: Path, new: Path, held: int) -> None:
     if there := [name for name in names if list(old.glob(f"lib/python*/site-packages/{name}-*.dist-info"))]:
         again = [python, str(root / "requirements/install_engines.py"), str(root / "requirements"), *there]
         call(again, held)
-    call([python, "-m", "compileall", "-q", "-j", "0", str(new)], held, capture_output=True)
+    print("stiffdice: compiling packages and, beside them, the kernels of `make paper` (about 20 s)", flush=True)
+    beside = Thread(target=call, args=([python, str(root / "workflow/compile_kernels.py"), "paper"], held, True))
+    beside.start()
+    call([python, "-m", "compileall", "-q", "-j", "0", str(new)], held, True)
+    beside.join()
     (new / ".installed").write_text(digest(root) + "\n", encoding="ascii")
 
 
-def call(command: list[str], held: int, **options: bool) -> int:
+def call(command: list[str], held: int, silent: bool = False) -> int:
     """Run a command, which inherits the locked file, and return its exit status."""
-    return subprocess.run(command, check=False, env=os.environ | QUIET, pass_fds=[held], **options).returncode
+    environment = os.environ | QUIET
+    return subprocess.run(command, check=False, env=environment, pass_fds=[held], capture_output=silent).returncode
 
 
 def empty(venv: Path, held: int) -> list[str]:
@@ -148,7 +154,7 @@ def empty(venv: Path, held: int) -> list[str]:
         (shutil.which("uv"), ["uv", "venv", "--quiet", "--seed", "--python", python], own),
     ]
     for there, command, pip in ways:
-        if there and call([*command, str(venv)], held, capture_output=True) == 0:
+        if there and call([*command, str(venv)], held, True) == 0:
             return pip
         shutil.rmtree(venv, ignore_errors=True)
     raise SetUpError(

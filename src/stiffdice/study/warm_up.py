@@ -1,10 +1,9 @@
-"""Shortest runs that load the compiled kernels a study's jobs need, for a process that the jobs are forked from."""
+"""Shortest runs that load, or compile, the kernels that the jobs of a study need."""
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,15 +22,19 @@ _MEMBERS = 4  # of a cell: so many go side by side
 _DURATION = 1e-6  # s: in which no cube that is thrown reaches the ground
 
 
-def load_kernels(study: Study, root: Path = Path()) -> Iterator[None]:
-    """Load what is stored, and compile nothing; yields between two runs of one step. root: where the scenes are."""
+def load_kernels(study: Study, root: Path = Path(), *, compiling: bool = False) -> Iterator[None]:
+    """Load what is stored, and compile the rest or, by default, nothing; yields between two runs of one step.
+
+    root: where the scenes are.
+    """
     seen = set()
+    loading = nullcontext if compiling else only_stored
     for planned in study.runs.values():
         kernels = (planned.model, planned.scheme)
         if planned.simulator == OURS and kernels not in seen:
             seen.add(kernels)
             scene = scenes.load(root / planned.scene, preset=planned.presets[0])
-            with _only_loading():
+            with _whatever_fails(), loading():
                 run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
                 if planned.scheme in energy_budget.BOOKED:
                     energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
@@ -39,7 +42,7 @@ def load_kernels(study: Study, root: Path = Path()) -> Iterator[None]:
     for sweep in study.sweeps.values():
         if sweep.simulator == OURS:
             scene, criteria = replace(sweep.scene, duration=_DURATION), sweep.criteria
-            with _only_loading():
+            with _whatever_fails(), loading():
                 launches = turned(scene, sweep.model, _MEMBERS)
                 compared = references(scene, sweep.model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
                 members = phased(scene, sweep.model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
@@ -48,8 +51,6 @@ def load_kernels(study: Study, root: Path = Path()) -> Iterator[None]:
             yield
 
 
-@contextmanager
-def _only_loading() -> Iterator[None]:
-    """End the block where it would compile; and where the scene is such that its jobs fail, which they tell."""
-    with contextlib.suppress(NotStoredError, StiffdiceError), only_stored():
-        yield
+def _whatever_fails() -> AbstractContextManager[None]:
+    """End the block where it may not compile; and where the scene is such that its jobs fail, which they tell."""
+    return suppress(NotStoredError, StiffdiceError)

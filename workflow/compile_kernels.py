@@ -1,0 +1,16 @@
+"""Compile the kernels that the jobs of some studies need, for all that come after: compile_kernels.py STUDY..."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "src")]
+
+from stiffdice.study import config, warm_up  # noqa: E402
+
+for name in sys.argv[1:]:
+    study = config.load(ROOT / f"config/{name}.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+    for _ in warm_up.load_kernels(study, ROOT, compiling=True):
+        pass
