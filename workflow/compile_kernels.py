@@ -12,5 +12,5 @@ from stiffdice.study import config, warm_up  # noqa: E402
 
 for name in sys.argv[1:]:
     study = config.load(ROOT / f"config/{name}.yaml", ROOT / "workflow/schemas/study.schema.yaml")
-    for _ in warm_up.load_kernels(study, ROOT, compiling=True):
-        pass
+    for run in warm_up.short_runs(study, ROOT):
+        warm_up.compile_kernels(run)

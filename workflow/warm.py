@@ -104,15 +104,27 @@ class Warm:
 
 
 def load(names: list[str]) -> Iterator[None]:
-    """Import what jobs need, and load the kernels of some studies, as far as they are stored, little by little."""
+    """Import what jobs need and load the kernels of some studies, little by little; have those not stored compiled."""
     for name in _MODULES:
         importlib.import_module(name)
         yield
     from stiffdice.study import config, warm_up
 
+    missing = []
     for name in names:
         with contextlib.suppress(StiffdiceError):  # which Snakemake tells
-            yield from warm_up.load_kernels(config.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml"))
+            for run in warm_up.short_runs(config.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml")):
+                if not warm_up.load(run):
+                    missing.append(run)
+                yield
+    if missing and not os.fork():
+        # Jobs of one kind all wait for the same kernel; a core is free for those of the next.
+        try:
+            end_with_parent("warm.py")
+            for run in missing:
+                warm_up.compile_kernels(run)
+        finally:
+            os._exit(0)
 
 
 def main() -> NoReturn:

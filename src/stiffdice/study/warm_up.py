@@ -1,10 +1,11 @@
-"""Shortest runs that load, or compile, the kernels that the jobs of a study need."""
+"""Shortest runs, which load or compile the kernels that the jobs of a study need."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext, suppress
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,41 +17,49 @@ from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import simulate
-from stiffdice.study.config import Study
+from stiffdice.study.config import PlannedRun, Study
+from stiffdice.sweep.grid import Sweep
 
 _MEMBERS = 4  # of a cell: so many go side by side
 _DURATION = 1e-6  # s: in which no cube that is thrown reaches the ground
 
-
-def load_kernels(study: Study, root: Path = Path(), *, compiling: bool = False) -> Iterator[None]:
-    """Load what is stored, and compile the rest or, by default, nothing; yields between two runs of one step.
-
-    root: where the scenes are.
-    """
-    seen = set()
-    loading = nullcontext if compiling else only_stored
-    for planned in study.runs.values():
-        kernels = (planned.model, planned.scheme)
-        if planned.simulator == OURS and kernels not in seen:
-            seen.add(kernels)
-            scene = scenes.load(root / planned.scene, preset=planned.presets[0])
-            with _whatever_fails(), loading():
-                run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
-                if planned.scheme in energy_budget.BOOKED:
-                    energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
-            yield
-    for sweep in study.sweeps.values():
-        if sweep.simulator == OURS:
-            scene, criteria = replace(sweep.scene, duration=_DURATION), sweep.criteria
-            with _whatever_fails(), loading():
-                launches = turned(scene, sweep.model, _MEMBERS)
-                compared = references(scene, sweep.model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
-                members = phased(scene, sweep.model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
-                asked: dict[str, Any] = {"criteria": criteria, "stop": criteria, "references": compared}
-                simulate(scene, model=sweep.model, scheme=sweep.scheme, steps=1, members=members, **asked)
-            yield
+ShortRun = Callable[[], None]
 
 
-def _whatever_fails() -> AbstractContextManager[None]:
-    """End the block where it may not compile; and where the scene is such that its jobs fail, which they tell."""
-    return suppress(NotStoredError, StiffdiceError)
+def short_runs(study: Study, root: Path = Path()) -> Iterator[ShortRun]:
+    """Yield functions that make runs of one step, each with kernels of its own. root: where the scenes are."""
+    planned = {(run.model, run.scheme): run for run in study.runs.values() if run.simulator == OURS}
+    yield from (partial(_trajectory, run, root) for run in planned.values())
+    yield from (partial(_cell, sweep) for sweep in study.sweeps.values() if sweep.simulator == OURS)
+
+
+def load(run: ShortRun) -> bool:
+    """Load the kernels of a run, and compile none; return whether all are stored."""
+    try:
+        with only_stored():
+            compile_kernels(run)
+    except NotStoredError:
+        return False
+    return True
+
+
+def compile_kernels(run: ShortRun) -> None:
+    """Compile the kernels of a run that are not stored; a scene in which its jobs fail, too, they tell."""
+    with suppress(StiffdiceError):
+        run()
+
+
+def _trajectory(planned: PlannedRun, root: Path) -> None:
+    scene = scenes.load(root / planned.scene, preset=planned.presets[0])
+    run = simulate(scene, model=planned.model, scheme=planned.scheme, steps=1, every=1)
+    if planned.scheme in energy_budget.BOOKED:
+        energy_budget.ledger(scene, model=run.model, scheme=planned.scheme, steps=1)
+
+
+def _cell(sweep: Sweep) -> None:
+    scene, criteria = replace(sweep.scene, duration=_DURATION), sweep.criteria
+    launches = turned(scene, sweep.model, _MEMBERS)
+    compared = references(scene, sweep.model, launches[:1], 1e-3)[0] if "trajectory" in criteria else None
+    members = phased(scene, sweep.model, 1, _MEMBERS, launches, slice(0, _MEMBERS))
+    asked: dict[str, Any] = {"criteria": criteria, "stop": criteria, "references": compared}
+    simulate(scene, model=sweep.model, scheme=sweep.scheme, steps=1, members=members, **asked)
