@@ -44,7 +44,7 @@ def finished(tmp_path_factory):
     """A project whose study has run."""
     project = Project(tmp_path_factory.mktemp("stale"))
     project.plan(STUDY)
-    done = project.snakemake()
+    done = project.make("--cores", "2")
     assert done.returncode == 0, done.stderr
     return project
 

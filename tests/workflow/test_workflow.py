@@ -107,6 +107,13 @@ class Project:
             check=False,
         )
 
+    def make(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Do what `make study` does."""
+        command = [sys.executable, "workflow/run.py", "study", *arguments, "--config", "study=tiny"]
+        return subprocess.run(
+            command, cwd=self.folder, env=self.environment, capture_output=True, text=True, check=False
+        )
+
     def jobs_due(self) -> dict[str, int]:
         """Return what a dry run would do: rules and how many jobs of each."""
         done = self.snakemake("-n")
@@ -126,7 +133,7 @@ class Project:
 def finished(tmp_path_factory):
     """A project whose study has run; tests that change it take their changes back."""
     project = Project(tmp_path_factory.mktemp("finished"), own_source=True)
-    done = project.snakemake()
+    done = project.make("--cores", "2")
     assert done.returncode == 0, done.stderr
     return project
 
@@ -361,7 +368,7 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     (tmp_path / "absent").mkdir()
     (tmp_path / "absent" / "mujoco.py").write_text("raise ModuleNotFoundError")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "absent"))
-    done = project.snakemake("--cores", "2")
+    done = project.make("--cores", "2")
     assert done.returncode == 0, done.stderr
     told = "stiffdice: left out: sweeps.missing: simulator = mujoco: needs the package mujoco, which is not installed"
     assert done.stderr.count(told) == 1
@@ -375,11 +382,10 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.long
 def test_shard_size_and_order_change_no_number(finished, tmp_path):
     other = Project(tmp_path)
     other.plan({**TINY, "sweeps": {"steps": rounds.asked_in_parts(TINY["sweeps"]["steps"], 5)}})
-    done = other.snakemake("--cores", "1")
+    done = other.make("--cores", "1")
     assert done.returncode == 0, done.stderr
     data = ("sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "runs/*.h5", "experiments/*", "figures/[!t]*")
     assert other.results(*data) == finished.results(*data)
@@ -411,14 +417,7 @@ def test_a_killed_run_goes_on_where_it_was(finished, tmp_path):
 
 @pytest.mark.long
 def test_where_the_time_went_is_told(finished):
-    done = subprocess.run(
-        [sys.executable, "workflow/run.py", "--cores", "2", "study", "--forcerun", "collect", "--config", "study=tiny"],
-        cwd=finished.folder,
-        env=finished.environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = finished.make("--cores", "2", "--forcerun", "collect")
     assert done.returncode == 0, done.stderr
     assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
     assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
