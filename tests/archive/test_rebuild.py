@@ -32,7 +32,7 @@ from stiffdice.io.writer import write_dataset
 from stiffdice.report.figures import registry as figures
 from stiffdice.scene.scene import load
 from stiffdice.simulation import energy_budget
-from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.dataset import plain_run_dataset
 from stiffdice.simulation.run import simulate
 from stiffdice.study import config as studies
 
@@ -355,7 +355,8 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
         (folder / path).parent.mkdir(parents=True)
     for preset in ("as_listed", "as_written"):
         scene = load(ROOT / "config/scenes/figure-09.yaml", preset=preset)
-        run = run_dataset(simulate(scene, model="sliding", steps=400, every=1), f"fall, {preset.replace('_', ' ')}")
+        made = simulate(scene, model="sliding", steps=400, every=1)
+        run = plain_run_dataset(made, f"fall, {preset.replace('_', ' ')}")
         ledger = energy_budget.ledger(scene, model="sliding", steps=400)
         path = folder / f"results/tiny/runs/fall.{preset}.h5"
         write_dataset(run.assign(ledger.data_vars), path)

@@ -26,10 +26,10 @@ from stiffdice.study.job_log import Told
 from stiffdice.study.outputs import Result
 from stiffdice.sweep import partition as shards
 
-# Of a job, besides what it simulates: Python, what it imports, compiled code that it loads, files, drawing.
+# Of a job that the warm process takes, besides what it simulates: files, drawing. One of its own also imports, for 1 s.
 _JOB = {
-    **{"trajectory": 1.2, "experiment": 1.0, "timings": 1.0, "shard": 1.2, "survey": 1.1, "collect": 1.2},
-    **{"frontier": 1.0, "figure": 1.3, "animation": 9.0, "table": 1.0},
+    **{"trajectory": 0.3, "experiment": 0.3, "timings": 0.3, "shard": 0.3, "survey": 0.3, "collect": 0.4},
+    **{"frontier": 0.2, "figure": 0.5, "animation": 1.1, "table": 0.2},
 }
 _DRAWING = 1.0  # more than that, of a figure that shows more than a run
 _STARTING = 0.12  # of Snakemake, to choose and start a job
@@ -52,7 +52,7 @@ _LATER = 0.25
 
 # Where nothing is compiled yet, the first job of a kind compiles: of runs and of sweeps for each model, and of all else
 # once.
-_COMPILING = {"trajectory": 4.0, "shard": 9.0, "experiment": 5.0, "timings": 5.0}
+_COMPILING = {"trajectory": 6.0, "shard": 12.0, "experiment": 5.0, "timings": 5.0}
 
 # What takes `_SUM` seconds on the machine of `cost`: that many numbers added, each waiting for the one before.
 _NUMBERS, _SUM = np.ones(4096), 1.27e-5
@@ -103,7 +103,7 @@ def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
 def seconds(study: Study) -> dict[Result, float]:
     """Return how long the job of each result of a study takes [s], on a core of the machine that `cost` is of."""
     found, compiled = dict[Result, float](), set[tuple[str, ...]]()
-    cold = not any(cache_folder().glob("simulation_*/*._march-*.nbc"))  # without a loop of runs
+    cold = not any(cache_folder().glob("*._march-*.nbc"))  # without a loop of runs
     for result in outputs.of(study):
         work, kinds = _work(study, result)
         found[result] = _JOB[result.stage] + _STARTING + work
