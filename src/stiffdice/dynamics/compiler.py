@@ -225,11 +225,19 @@ class _Part(_Dispatcher):  # type: ignore[misc]
         return _callable(self)(*bound.args)
 
 
+# Functions of a part, at most, that is optimised: one that holds more is far from any inner loop.
+_MANY = 40
+
+
 class _PartLibrary(_Library):  # type: ignore[misc]
     """LLVM code of a part: turned into machine code with the kernel that takes it in, not before.
 
     It is optimised before, too: without that kernels compile in a tenth less time, and are slower by as much.
     """
+
+    def _optimize_final_module(self) -> None:
+        if sum(not function.is_declaration for function in self._final_module.functions) <= _MANY:
+            super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
