@@ -134,6 +134,7 @@ def due(project):
 DUE = ".venv is not what the lock files and pyproject.toml now say"
 
 
+@pytest.mark.long
 def test_a_file_that_was_only_touched_is_nothing_new(project):
     leads = project.venv.readlink()
     later = time.time() + 3600
@@ -143,6 +144,7 @@ def test_a_file_that_was_only_touched_is_nothing_new(project):
     assert project.venv.readlink() == leads
 
 
+@pytest.mark.long
 def test_who_reads_is_told_that_a_set_up_is_due_and_goes_on(due):
     project, old, _ = due
     assert project.call("requirements/install", "--check") == (0, "", f"stiffdice: {DUE}; make install sets it up\n")
@@ -160,6 +162,7 @@ time.sleep(600)
 """
 
 
+@pytest.mark.long
 def test_a_study_that_is_being_made_keeps_its_environment(due):
     project, old, new = due
     holder = project.start(".venv/bin/python", "-c", HOLDING)
@@ -190,6 +193,7 @@ time.sleep(600)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process uses")
+@pytest.mark.long
 def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
     project, old, new = due
     before = project.venv.readlink().name
@@ -206,6 +210,7 @@ def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
+@pytest.mark.long
 def test_a_set_up_that_fails_leaves_the_old_environment(due):
     project, old, _ = due
     project.lock("requirements", f"tiny==9.0 \\\n    --hash=sha256:{'0' * 64}\n")
@@ -216,6 +221,7 @@ def test_a_set_up_that_fails_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
+@pytest.mark.long
 def test_an_interrupted_set_up_leaves_the_old_environment(due):
     project, old, new = due
     leads = project.venv.readlink()
@@ -230,6 +236,7 @@ def test_an_interrupted_set_up_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
+@pytest.mark.long
 def test_of_two_set_ups_at_once_one_waits_for_what_the_other_started(due):
     """Pip goes on when its set-up is killed, and the next one lets it end."""
     project, _, new = due
@@ -255,6 +262,7 @@ def children(process: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
 
 
+@pytest.mark.long
 def test_an_environment_of_an_earlier_version_of_stiffdice_is_exchanged_too(due):
     project, _, new = due
     folder = project.venv.resolve()
@@ -267,6 +275,7 @@ def test_an_environment_of_an_earlier_version_of_stiffdice_is_exchanged_too(due)
 
 
 @pytest.mark.parametrize("sign", [" ", "'", '"', "$", ";", "{", "}", "\n", "\t", "`", "&", "(", "\\", ":", "*"])
+@pytest.mark.long
 def test_a_folder_that_snakemake_cannot_work_in_is_one_line_before_anything_is_done(tmp_path, sign):
     project = Project.new(tmp_path / f"my{sign}project")
     line = f"stiffdice: {str(project.folder)!r}: {sign!r} in a path is not for Snakemake; move the project\n"

@@ -110,6 +110,7 @@ def test_an_error_that_is_none_is_told(text):
         parsed_error(text)
 
 
+@pytest.mark.long
 def test_a_pilot_that_takes_too_long_ends_and_advice_with_it():
     """A cube that chatters on stiff ground costs event a step for every swing."""
     advice = advise(resting(stiffness=1e8), 1e-3, scheme="event", patience=200_000)

@@ -568,6 +568,7 @@ def test_exit_statuses(diff, pair, run):
         ("cut.h5", "cut.h5: damaged|cut.h5: not a readable HDF5 file"),
     ],
 )
+@pytest.mark.long
 def test_what_cannot_be_compared_is_refused(diff, pair, tmp_path, other, told):
     (tmp_path / "text.h5").write_text("text")
     (tmp_path / "cut.h5").write_bytes(pair[0].read_bytes()[:-100])

@@ -58,6 +58,7 @@ def ids(value) -> list[str]:
     return [part["@id"] for part in (value if isinstance(value, list) else [value])]
 
 
+@pytest.mark.long
 def test_the_validator_finds_nothing_that_is_required_or_that_we_could_say(archive, tmp_path):
     told = roc.findings(archive, PROFILE, tmp_path)
     assert told["REQUIRED"] == set()
@@ -65,6 +66,7 @@ def test_the_validator_finds_nothing_that_is_required_or_that_we_could_say(archi
     assert told["RECOMMENDED"] - without_address == NOT_OURS
 
 
+@pytest.mark.long
 def test_with_an_address_and_an_agent_only_the_publisher_is_left_to_say(finished, tmp_path):
     folder = tmp_path / "project"
     shutil.copytree(finished[0], folder, symlinks=True)
@@ -79,6 +81,7 @@ def test_with_an_address_and_an_agent_only_the_publisher_is_left_to_say(finished
     assert "publisher" in publisher
 
 
+@pytest.mark.long
 def test_the_validator_would_find_what_is_missing(archive, tmp_path):
     """Of every profile one demand, so that a validator that checks nothing is noticed."""
     demands = {

@@ -129,6 +129,7 @@ def project(tmp_path):
 
 @pytest.mark.workflow
 @pytest.mark.parametrize("in_sandbox", [pytest.param(True, marks=sandboxes.needed), False])
+@pytest.mark.long
 def test_it_runs_other_code_away_from_everything(project, tmp_path, monkeypatch, in_sandbox):
     """No network, no home, none of the variables of who runs it; and it says whose code gives what."""
     monkeypatch.setenv("SECRET", "leaks")
@@ -147,6 +148,7 @@ def test_it_runs_other_code_away_from_everything(project, tmp_path, monkeypatch,
 
 @sandboxes.needed
 @pytest.mark.workflow
+@pytest.mark.long
 def test_what_differs_is_told_and_kept(project, tmp_path, capsys):
     (project / "results/tiny/same.txt").write_text("same but for this")
     path, kept = packed(project, tmp_path / "a.zip"), tmp_path / "kept"
@@ -194,6 +196,7 @@ def test_nothing_to_compare_is_not_the_same(project, tmp_path):
 
 
 @pytest.mark.workflow
+@pytest.mark.long
 def test_a_run_that_fails_is_told_with_its_last_lines(project, tmp_path, capsys):
     (project / "workflow/scripts/job.py").write_text("raise ValueError('out of luck')")
     path = packed(project, tmp_path / "a.zip")
@@ -231,6 +234,7 @@ def on_terminal(answer: str, *words: str) -> tuple[int, str]:
     return status, told
 
 
+@pytest.mark.long
 def test_other_code_is_run_only_if_somebody_says_so(project, tmp_path, capsys):
     """Without a terminal by --yes, on one by the answer; nothing of it is executed before."""
     executed = tmp_path / "executed"
@@ -254,6 +258,7 @@ def test_without_a_sandbox_other_code_is_not_run(project, tmp_path, monkeypatch,
     assert "bubblewrap (bwrap) is not installed; --no-sandbox would let it do whatever you can" in told
 
 
+@pytest.mark.long
 def test_a_run_is_ended_by_an_error_of_who_waits_for_it(project, tmp_path):
     (project / "workflow/run.py").write_text(STUBBORN)
 
@@ -294,6 +299,7 @@ def all_of(running: psutil.Popen, name: str) -> list[psutil.Process]:
         (["--no-sandbox"], signal.SIGKILL, -9),
     ],
 )
+@pytest.mark.long
 def test_nothing_of_a_run_outlives_it(project, tmp_path, words, number, status):
     """However it ends, also what has left its session and pays no attention; only a kill leaves files behind."""
     if words and "leave processes behind" in unconfined(tmp_path).could:

@@ -201,6 +201,7 @@ FORGERIES = {
 
 
 @pytest.mark.parametrize("what", FORGERIES)
+@pytest.mark.long
 def test_numbers_that_cannot_be_are_named_though_every_digest_is_right(folder, what):
     file, name, place, change, blamed = FORGERIES[what]
     path = shard_of(folder) if file is None else folder / file

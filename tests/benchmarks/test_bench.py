@@ -153,6 +153,7 @@ def test_turns_are_as_many_as_asked_and_spread(times, rounds):
         assert np.ptp(np.diff(turns)) <= 1
 
 
+@pytest.mark.long
 def test_cases_take_turns_and_what_stands_alone_is_not_warmed_up():
     calls = []
 

@@ -283,6 +283,7 @@ def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
     def tiny_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
@@ -294,6 +295,7 @@ def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
     assert not (tmp_path / "out.h5").exists()
 
 
+@pytest.mark.long
 def test_a_long_run_tells_its_progress(tmp_path):
     done = command(
         "run", SCENE, "--steps", "20000", "-o", "out.h5", "--model", "tumbling", "--steps", "2e7", cwd=tmp_path

@@ -57,6 +57,7 @@ DRIVING = {"stiffdice.simulation.engines.registry"}
         ("__init__.py", SIMULATION | DRAWING | COMPARING | DRIVING),
     ],
 )
+@pytest.mark.long
 def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
     before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING | DRIVING}
     with (copy / changed).open("a") as file:
@@ -93,6 +94,7 @@ print(energies(physics_of(scene), start_of(scene, "sliding"))[2][0])
 
 
 @pytest.mark.parametrize("first", ["", "import numba\n"], ids=["", "numba imported before"])
+@pytest.mark.long
 def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     """Numba itself would not notice: the kernel that is cached lies in another file."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -102,6 +102,7 @@ assert kernels.load(sys.argv[2]) == sys.argv[2] * 1000
 """
 
 
+@pytest.mark.long
 def test_processes_that_write_at_once_read_whole_kernels_or_none(kernels, tmp_path):
     """Among them is damage, too."""
     started = [subprocess.Popen([sys.executable, "-c", TWO, tmp_path, name]) for name in ("one", "two", "three")]
@@ -157,6 +158,7 @@ def made_a_folder(path, whole, rng):
 
 
 @pytest.mark.parametrize("damages", [[flipped], [cut_short, emptied, made_a_folder]], ids=["bits", "files"])
+@pytest.mark.long
 def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled, damages):
     folder, first = compiled
     whole, rng = cached(folder), np.random.default_rng(15)
@@ -170,6 +172,7 @@ def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled, 
     assert cached(folder) == healed  # nothing was compiled again
 
 
+@pytest.mark.long
 def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
     """No file of this process may be as long."""
     _, first = compiled
@@ -187,6 +190,7 @@ print(next(iter(energies.dispatcher.stats.cache_hits.values()), 0))
 """
 
 
+@pytest.mark.long
 def test_a_copy_of_the_project_finds_its_kernels(tmp_path):
     """They are known by the digest of what they stand on, not by where that lies."""
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
@@ -217,6 +221,7 @@ print(float(run.trajectory.state["position"][-1, 2]).hex())
 """
 
 
+@pytest.mark.long
 def test_what_one_process_compiles_another_waits_for(tmp_path):
     """Two processes, each with a helper of its own, make each of the five kernels of a run once."""
     environment, saved = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "saved"
@@ -265,6 +270,7 @@ def to_stranger(folder):
 @pytest.mark.parametrize("change", [to_link, to_stranger, lambda folder: folder.chmod(0o777)])
 @pytest.mark.parametrize("which", ["leaf", "parent"])
 @pytest.mark.parametrize("place", ["tmp", "home"])
+@pytest.mark.long
 def test_a_folder_that_another_could_have_filled_is_not_used(tmp_path, change, which, place):
     if place == "tmp":
         (tmp_path / "nowhere").write_text("")

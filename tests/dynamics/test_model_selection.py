@@ -102,6 +102,7 @@ def cancels_to_the_last_bit(scene, model):
     return upright and (scene.ground.friction == 0 or model == "vertical")
 
 
+@pytest.mark.long
 def test_a_lesser_model_is_the_full_one_to_round_off_in_thousands_of_scenes():
     """To the last bit where torques cancel to the last bit; elsewhere for two bounces, before round-off grows large.
 

@@ -144,6 +144,7 @@ def test_without_gravity_there_is_one_answer():
     np.testing.assert_array_equal(found.gravity_theory, 0)
 
 
+@pytest.mark.long
 def test_the_map_is_the_same_for_any_cube_and_ground(measured):
     """Nor does it matter what the scene says of all that the experiment sets."""
     other = {
@@ -203,6 +204,7 @@ def test_what_cannot_be_measured_is_said(scene, arguments, told):
         {"ground": {"stiffness": 1e6}, "gravity": 399, "launch": {"position": [0, 0, 0.5228], "velocity": [0, 0, 0]}},
     ],
 )
+@pytest.mark.long
 def test_all_that_is_allowed_is_measured(scene):
     """Near the ends of what is allowed: deep, shallow, heavy, and both."""
     found = bounce_map.measure(from_mapping(scene), omega_h=(0.02, 1.999), count=20, phases=50)

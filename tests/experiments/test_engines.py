@@ -118,6 +118,7 @@ def test_a_throw_comes_closer_with_the_step_and_numpy_is_as_far_as_we_are(throw)
     np.testing.assert_allclose(throw.distance, np.sqrt((away**2).sum(axis=-1)), rtol=1e-12)
 
 
+@pytest.mark.long
 def test_steps_and_evaluations_are_counted(speed):
     assert of(speed, "numpy").taken.values.tolist() == [600, 600]
     assert (of(speed, "scipy").taken != 600).all()

@@ -22,6 +22,7 @@ def status(project) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_a_result_that_is_a_link_to_nowhere_is_one_line(undisturbed, tmp_path):
     project = undisturbed.copy(tmp_path / "project")
     figure = project.results / "figures/books.svg"
@@ -40,6 +41,7 @@ def test_a_result_that_is_a_link_to_nowhere_is_one_line(undisturbed, tmp_path):
     assert project.data() == undisturbed.data()
 
 
+@pytest.mark.long
 def test_rubbish_among_the_notes_of_snakemake_is_forgotten(undisturbed, tmp_path):
     project = undisturbed.copy(tmp_path / "project")
     notes = [path for path in (project.folder / ".snakemake/metadata").rglob("*") if path.is_file()]
@@ -66,6 +68,7 @@ def may_be_bound() -> bool:
 
 
 @pytest.mark.skipif(not may_be_bound(), reason="not root, or no setpriv")
+@pytest.mark.long
 def test_logs_and_benchmarks_of_another_user_and_links_give_way(undisturbed, tmp_path):
     project = undisturbed.copy(tmp_path / "project")
     for stage, name in (("trajectory", "stiff.as_listed"), ("experiment", "books")):

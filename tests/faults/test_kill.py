@@ -275,6 +275,7 @@ def test_a_process_ends_with_its_parent():
 
 
 @linux
+@pytest.mark.long
 def test_a_process_whose_parent_is_gone_already_does_not_begin(tmp_path):
     child = (
         "import os, sys, time\nfrom pathlib import Path\nfrom stiffdice.io.process import end_with_parent\n"

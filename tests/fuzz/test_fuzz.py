@@ -30,6 +30,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("reader", READERS)
+@pytest.mark.long
 def test_a_spoilt_file_is_refused_in_one_line_or_sound(reader):
     cases = int(os.environ.get("STIFFDICE_FUZZ", CASES[reader]))
     first = int(os.environ.get("STIFFDICE_FUZZ_FIRST", "0"))

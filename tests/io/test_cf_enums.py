@@ -29,6 +29,7 @@ def suite():
 
 @pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier", "experiment"])
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_files_keep_the_cf_conventions(written, tmp_path, suite, kind):
     # CF wants names that end in .nc; ours end in .h5, as those who read HDF5 expect.
     path = shutil.copy(written[kind], tmp_path / f"{kind}.nc")

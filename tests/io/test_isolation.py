@@ -87,6 +87,7 @@ def test_a_file_that_ends_the_child_is_refused_and_those_after_it_are_tried(stor
 
 
 @pytest.mark.parametrize("code", ["while True: pass", "time.sleep(60)"])
+@pytest.mark.long
 def test_a_file_that_takes_too_long_ends_the_child(code):
     code = f"""
 import time

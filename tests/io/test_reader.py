@@ -86,6 +86,7 @@ READERS = [
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("read", READERS)
+@pytest.mark.long
 def test_every_value_is_read_back_equal(written, read, kind):
     ours = open_file(written[kind])
     found = read(written[kind], [str(name) for name in ours.variables])

@@ -37,6 +37,7 @@ def extreme(kind, law):
 @pytest.mark.parametrize("kind", EXTREMES)
 @pytest.mark.parametrize("law", ["gated", "ungated"])
 @pytest.mark.parametrize("steps", [1, 10_000])
+@pytest.mark.long
 def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps):
     """A few seconds of work, however the intervals are."""
     begun = time.process_time()
@@ -48,6 +49,7 @@ def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps):
     assert ended in (Verdict.PASSED, Verdict.SANK, Verdict.UNDECIDED, Verdict.LEFT_NUMERIC_RANGE)
 
 
+@pytest.mark.long
 def test_no_part_of_a_run_takes_longer_than_ctrl_c_may_wait():
     told = [time.process_time()]
     scene = extreme("spin", "gated")
@@ -106,6 +108,7 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
 
 @pytest.mark.parametrize("kind", EXTREMES)
 @pytest.mark.parametrize("law", ["gated", "ungated"])
+@pytest.mark.long
 def test_advise_ends_soon_whatever_the_scene(kind, law):
     """With advice, for a part of the time at least, or by saying that it finds no path."""
     begun = time.process_time()
@@ -128,6 +131,7 @@ LONG = {
 
 
 @pytest.mark.parametrize("kind", LONG)
+@pytest.mark.long
 def test_ctrl_c_ends_a_run_at_once(kind, tmp_path):
     ground = "stiffness: 1.0e+10, contact: gated"
     launch = "position: [0, 0, 0.5177], velocity: [0.3, 0, 0], node_velocity: rigid"

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 # Loads the kernels of the study `quick` and says how many signatures the loop of runs has then.
@@ -33,6 +35,7 @@ def python(text: str, cache: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_what_is_stored_is_loaded_and_nothing_is_compiled(tmp_path):
     runs, *loaded = python(LOAD, tmp_path).split()
     assert int(runs) > 1

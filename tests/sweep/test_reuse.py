@@ -59,6 +59,7 @@ def compute(plan, folder):
         compute_shard(plan, planned.pieces, folder / f"{name}.h5", kept=Kept(plan, planned.pieces, folder, of))
 
 
+@pytest.mark.long
 def test_an_extended_grid_computes_what_is_new_and_nothing_else(extended, small, folder, tmp_path, monkeypatch):
     made = counted(monkeypatch)
     compute(extended, folder)

@@ -125,6 +125,7 @@ def test_stopping_early_changes_no_judgement_and_saves_work(tmp_path):
     assert never.attrs["criteria"] == "energy: energy_ratio <= 1.05"
 
 
+@pytest.mark.long
 def test_each_round_adds_what_the_rounds_before_left_in_doubt(tmp_path):
     """And changes nothing else: a cell's numbers do not depend on the round in which it was asked."""
     planned = small()

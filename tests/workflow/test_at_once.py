@@ -54,6 +54,7 @@ def call(project: Project, command: list[str]) -> tuple[int, str, str]:
     return started.returncode, out, err
 
 
+@pytest.mark.long
 def test_two_studies_at_once_each_tell_of_their_own_jobs(project):
     (project.folder / "results/few/logs/experiment/books.log/in-the-way").mkdir(parents=True)
     started = {name: start(project, run(name)) for name in ("many", "few")}
@@ -83,6 +84,7 @@ def suspended(project):
     first.communicate()
 
 
+@pytest.mark.long
 def test_a_study_that_is_being_made_is_not_made_twice_and_nothing_stays_locked(project, suspended):
     first = suspended
     holder = rf"by process {first.pid} on \S+ since \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d UTC"
@@ -110,6 +112,7 @@ def test_a_study_that_is_being_made_is_not_made_twice_and_nothing_stays_locked(p
     assert not (project.folder / ".snakemake").exists()
 
 
+@pytest.mark.long
 def test_a_killed_make_takes_its_run_along(project):
     shutil.copy(ROOT / "Makefile", project.folder)
     make = start(project, ["make", "-o", "install", "study", "STUDY=many", f"BIN={Path(sys.executable).parent}"])
@@ -126,6 +129,7 @@ def test_a_killed_make_takes_its_run_along(project):
     make.communicate()
 
 
+@pytest.mark.long
 def test_a_run_goes_on_without_the_shell_that_started_it(project):
     command = f"{shlex.join(run('few'))} > told 2>&1 & while [ ! -d results/few/logs ]; do sleep 0.1; done"
     subprocess.run(["sh", "-c", command], cwd=project.folder, env=project.environment, check=True)

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 SAID = [
     "Building DAG of jobs...",
@@ -44,6 +46,7 @@ def test_on_a_terminal_what_is_left_is_one_line_that_moves():
     assert shown == f"{first}\n{zero}\r\x1b[K{one}\r\x1b[K{aside}\n"
 
 
+@pytest.mark.long
 def test_a_run_that_fails_before_a_job_shows_what_snakemake_says(tmp_path):
     command = [sys.executable, "workflow/run.py", "--cores", "1", "no_such_rule"]
     failed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

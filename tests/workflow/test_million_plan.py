@@ -15,6 +15,7 @@ ROOT = Path(__file__).parent.parent.parent
 
 
 @pytest.mark.workflow
+@pytest.mark.long
 def test_a_dry_run_of_a_million_runs_has_sixteen_equal_jobs_a_sweep_and_stays_small(tmp_path, monkeypatch):
     """Sixteen jobs share the work of a sweep this cheap; where a contact law ends there is a shorter one."""
     monkeypatch.chdir(ROOT)

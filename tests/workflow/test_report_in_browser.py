@@ -72,6 +72,7 @@ def test_a_script_in_a_page_would_be_seen(tmp_path):
     assert seen.title == "broken" and seen.elements == 1
 
 
+@pytest.mark.long
 def test_nothing_of_a_title_runs_in_the_report(tmp_path):
     project = Project(tmp_path)
     run = {**TINY["runs"]["stiff"], "presets": ["as_listed"], "steps": 1000}
@@ -87,6 +88,7 @@ def test_nothing_of_a_title_runs_in_the_report(tmp_path):
     assert f"{SHOWN} (tiny)." in seen.text
 
 
+@pytest.mark.long
 def test_nothing_of_a_title_runs_in_the_page_of_an_archive(tmp_path, monkeypatch):
     folder = packing.project(tmp_path / "project")
     figures = {"position": {**packing.TINY["figures"]["position"], "title": TITLE}}

@@ -135,12 +135,14 @@ def test_another_study_is_run_though_snakemake_forgot(copied, before, after, due
     assert copied.jobs_due() == due
 
 
+@pytest.mark.long
 def test_every_round_is_run_at_once_where_all_are_stale(copied):
     shutil.rmtree(copied.folder / "results/tiny/logs/shard")
     shutil.rmtree(copied.folder / "results/tiny/logs/survey")
     assert copied.jobs_due() == SWEPT
 
 
+@pytest.mark.long
 def test_the_same_study_is_not_run_though_snakemake_forgot(copied):
     forget(copied)
     for path in (copied.folder / "config").rglob("*.yaml"):
@@ -151,6 +153,7 @@ def test_the_same_study_is_not_run_though_snakemake_forgot(copied):
     assert stiffdice(copied, "verify", "results/tiny").returncode == 0
 
 
+@pytest.mark.long
 def test_what_is_asked_for_by_name_is_made_again_and_no_more(copied):
     change(copied, "tiny.yaml", "title: Position", "title: Place")
     change(copied, "tiny.yaml", "title: Books", "title: Ledger")
@@ -162,6 +165,7 @@ def test_what_is_asked_for_by_name_is_made_again_and_no_more(copied):
     assert re.search(r"^figure +1\ntotal +1$", done.stdout + done.stderr, re.MULTILINE)
 
 
+@pytest.mark.long
 def test_what_is_stale_is_told_refused_and_made_again(copied):
     """And is as a study that was asked this from the start."""
     change(copied, "scenes/figure-09.yaml", "damping: 0.2", "damping: 0.3")
@@ -220,6 +224,7 @@ def swapped(project):
     return list(files)
 
 
+@pytest.mark.long
 def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp_path):
     names = swapped(copied)
     told = stiffdice(copied, "status", "tiny")
@@ -235,6 +240,7 @@ def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp
         assert len(failing) == len(names)
 
 
+@pytest.mark.long
 def test_a_figure_that_was_touched_up_is_set_aside_and_made_again(copied):
     figure = copied.folder / "results/tiny/figures/position.png"
     before = figure.read_bytes()
@@ -248,6 +254,7 @@ def test_a_figure_that_was_touched_up_is_set_aside_and_made_again(copied):
     assert copied.jobs_due() == {}
 
 
+@pytest.mark.long
 def test_a_log_that_is_gone_tells_nothing(copied):
     (copied.folder / "results/tiny/logs/experiment/books.log").unlink()
     assert copied.jobs_due() == {"experiment": 1, "figure": 1}

@@ -223,6 +223,7 @@ def test_a_changed_style_redraws_only(finished, edited):
     assert finished.jobs_due() == {"figure": 4}
 
 
+@pytest.mark.long
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     edited("src/stiffdice/dynamics/contact.py", lambda text: text.replace("push = times(fn", "push = times(1.0 * fn"))
     runs = {"shard": 2, "trajectory": 2, "experiment": 2, "timing": 1}
@@ -236,6 +237,7 @@ def test_a_changed_analysis_computes_no_run_again(finished, edited):
     assert finished.jobs_due() == {"frontier": 1, "figure": 1, "table": 1}
 
 
+@pytest.mark.long
 def test_a_changed_scene_is_run_again(finished, edited):
     edited("config/scenes/figure-09.yaml", lambda text: text.replace("damping: 0.2", "damping: 0.3"))
     assert finished.jobs_due() == {"trajectory": 2, "experiment": 1, "figure": 2}
@@ -268,6 +270,7 @@ def test_a_changed_script_does_its_part_again(finished, edited, script, due):
     assert finished.jobs_due() == due
 
 
+@pytest.mark.long
 def test_a_touched_file_is_no_change(finished):
     for path in [*(finished.folder / "workflow" / "scripts").iterdir(), *(finished.folder / "config").rglob("*.yaml")]:
         path.touch()
@@ -313,6 +316,7 @@ def test_another_grid_is_computed(finished, edited):
     assert finished.jobs_due() == AGAIN
 
 
+@pytest.mark.long
 def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
     edited("config/tiny.yaml", lambda text: text.replace("members: 4", "members: none"))
     done = finished.snakemake()

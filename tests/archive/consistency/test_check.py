@@ -332,6 +332,7 @@ def swapped(dataset, name, first, second):
         ("frontier", "edge", "first_pass", "last_fail"),
     ],
 )
+@pytest.mark.long
 def test_words_that_changed_places_are_told(kind, name, first, second, tmp_path):
     path = tmp_path / f"{kind}.h5"
     write_dataset(swapped(open_file(NEWEST / f"{kind}.h5"), name, first, second), path)

@@ -73,6 +73,7 @@ def solved(scene, method, rtol, samples=30):
 
 
 @pytest.mark.parametrize(("stiffness", "agreement"), [(1e2, 3e-9), (1e4, 3e-8), (1e8, 1e-8)])
+@pytest.mark.long
 def test_a_tumbling_throw_agrees_with_other_integrators(stiffness, agreement):
     scene = throw(stiffness)
     own, _ = places(scene, 1e-12)

@@ -58,6 +58,7 @@ def scenes(count):
 
 
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
+@pytest.mark.long
 def test_touches_down_when_the_lowest_node_first_reaches_the_ground(model):
     for scene in scenes(15):
         time = found(MODELS[model], physics_of(scene), start_of(scene, model), 1e9)

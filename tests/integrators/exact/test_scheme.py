@@ -205,6 +205,7 @@ FALLS = [
 
 @pytest.mark.parametrize(("given", "duration"), FALLS)
 @pytest.mark.parametrize("contact", CONTACT_LAWS)
+@pytest.mark.long
 def test_the_motion_against_40_digits(contact, given, duration):
     """Speeds up to 10 m/s: units in the last place of 1e-15, which each bounce makes larger as it does a launch's.
 

@@ -42,11 +42,13 @@ def lines_of(panel):
 
 
 @pytest.mark.parametrize("name", ["work-energy", "cost"])
+@pytest.mark.long
 def test_equal_data_give_equal_files(data, tmp_path, name):
     check_equal_files(name, {"flat": data["flat"]}, tmp_path)
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.long
 def test_axes_have_units_and_say_whether_work_or_time_is_shown(data, timings, name):
     for shown, unit in ((data, "force evaluations [1]"), (data | timings, "wall time [s]")):
         panels = drawn(name, shown).axes

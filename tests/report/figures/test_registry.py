@@ -36,6 +36,7 @@ def data(collected):
     "drawing",
     [name for name, entry in DRAWINGS.items() if entry.given == "runs" and name != "animation"] + ["frontier"],
 )
+@pytest.mark.long
 def test_each_drawing_has_units_on_its_axes_and_gives_equal_files(data, tmp_path, drawing):
     given = data[drawing[:4]]
     check_units(drawn(drawing, given))

@@ -75,6 +75,7 @@ def given(combs, maps):
 
 
 @pytest.mark.parametrize("name", ["pass-fraction", "stability-map"])
+@pytest.mark.long
 def test_axes_have_units_and_equal_data_give_equal_files(given, tmp_path, name):
     check_units(drawn(name, given[name]))
     check_equal_files(name, given[name], tmp_path)

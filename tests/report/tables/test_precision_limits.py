@@ -26,6 +26,7 @@ def by_name(dataset, which):
 
 
 @pytest.mark.parametrize("keys", [{}, OTHER], ids=["paper", "another"])
+@pytest.mark.long
 def test_every_limit_is_found_where_its_formula_says(keys, measured):
     dataset = measured if not keys else measure(from_mapping(keys))
     predicted, found = by_name(dataset, "predicted"), by_name(dataset, "measured")

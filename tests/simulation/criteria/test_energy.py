@@ -33,6 +33,7 @@ def test_a_flight_keeps_its_energy_at_any_step(velocity, normal, model, every, s
 
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
 @pytest.mark.parametrize("steps", [4, 1000])
+@pytest.mark.long
 def test_a_flight_neither_gains_nor_loses(model, steps):
     """Whichever of two moments counts as the launch, the other has no more energy."""
     launch = {"position": [0, 0, 400], "velocity": [1, 2, 7], "angular_momentum": [0.3, 0.5, 0.2]}

@@ -156,6 +156,7 @@ def at(place):
 
 
 @given(vector, vector, vector, st.floats(0.1, 10), st.floats(0, 1))
+@pytest.mark.long
 def test_a_parabola_is_interpolated_exactly(start, speed, pull, horizon, moment):
     reference, path = polynomial([start, speed, pull], horizon)
     t = moment * horizon

@@ -40,6 +40,7 @@ TILTED = {
 @pytest.mark.parametrize(
     ("model", "preset", "mapping"), [("tumbling", "as_listed", TILTED), ("sliding", "as_written", {})]
 )
+@pytest.mark.long
 def test_a_transcription_of_the_paper_is_our_scheme(engine, model, preset, mapping):
     """To round-off before the first bounce, and after it to what a contact or some make of that."""
     scene = from_mapping(mapping, preset)
