@@ -63,6 +63,7 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.long
 def test_a_cube_of_ones_own_is_thrown_as_the_readme_says(tmp_path, monkeypatch):
     (own,) = (block for block in blocks("README.md", "sh") if "my-cube.yaml" in block)
     command = own.replace("make install\n", "").replace(".venv/bin/stiffdice", f"{sys.executable} -m stiffdice.cli")
@@ -190,6 +191,7 @@ def without_times(output: str) -> tuple[list[str], set[tuple[str, ...]]]:
     return [*head.splitlines(), command.strip()], kept
 
 
+@pytest.mark.long
 def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
     """But for times, which are another machine's."""
     monkeypatch.chdir(ROOT)

@@ -22,6 +22,7 @@ def thrown(number, preset, steps, every=1):
     )
 
 
+@pytest.mark.long
 def test_four_fifths_of_the_energy_lost_is_lost_in_mid_air():
     kept = thrown(13, "as_listed", 1_000_000).trajectory
     energy = kept.energy_paper + kept.elastic_energy

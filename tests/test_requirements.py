@@ -83,6 +83,7 @@ def test_an_engine_is_installed_with_what_it_needs_and_nothing_of_the_others():
             assert block in lock
 
 
+@pytest.mark.long
 def test_an_engine_that_cannot_be_installed_is_left_out_with_a_line(tmp_path):
     (tmp_path / "engines.in").write_text("# none\n-c requirements.lock\nengine-of-none  # there is none\n")
     (tmp_path / "engines.lock").write_text(f"engine-of-none==1.0 \\\n    --hash=sha256:{'0' * 64}\n")

@@ -31,6 +31,7 @@ def off_scipy(advice, run):
 
 
 @pytest.mark.parametrize("error", [1e-8, 1e-7, 1e-5])
+@pytest.mark.long
 def test_what_is_promised_where_friction_holds_is_true_by_another_method(error):
     """Twins of one method share its error: LSODA found 3.6e-8 where they found 6e-10."""
     advice = advise(held(), error, scheme="event")

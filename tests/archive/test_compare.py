@@ -341,6 +341,7 @@ def change_cell(path, row, name, value):
     seal.seal(path)
 
 
+@pytest.mark.long
 def test_how_cells_are_dealt_is_no_difference(results):
     assert compare(*results).same
     assert not compare(results[0].parent, results[1]).same  # one level up nothing fits
@@ -426,6 +427,7 @@ def test_verdicts_that_changed_are_told_in_the_fields_words(results):
     assert f"steps = {steps}, member = 1: {before} against sank" in text
 
 
+@pytest.mark.long
 def test_edges_that_moved_are_told_by_law_and_stiffness(tmp_path, small):
     compute_shard(small, rounds.scan(small), tmp_path / "shard.h5")
     found = stability_limits.find(collect(parts(tmp_path / "shard.h5"), small.criteria))
@@ -549,6 +551,7 @@ def diff(capsys):
     return call
 
 
+@pytest.mark.long
 def test_exit_statuses(diff, pair, run):
     assert diff(*pair) == (0, "the same, byte for byte: 1 file\n", "")
     rewritten(pair[1], run, position=((25, 2), 7.0))

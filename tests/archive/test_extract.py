@@ -283,6 +283,7 @@ NAMES = st.sampled_from(
     changes=st.lists(st.tuples(st.integers(0, 2**16), st.integers(0, 255)), max_size=6),
     cut=st.integers(0, 3),
 )
+@pytest.mark.long
 def test_no_change_to_a_zip_file_makes_a_file_elsewhere_or_a_crash(tmp_path_factory, files, deflated, changes, cut):
     """What comes out, if anything does, is in the folder, as large as it says, and has the checksum it says."""
     top = tmp_path_factory.mktemp("fuzz")

@@ -87,6 +87,7 @@ def test_the_same_results_are_packed_in_the_same_bytes(finished, packed, tmp_pat
     assert again.path.read_bytes() == packed.path.read_bytes()
 
 
+@pytest.mark.long
 def test_two_rebuilds_differ_only_in_what_tells_times(packed, tmp_path, monkeypatch):
     folder = packing.project(tmp_path / "other")
     monkeypatch.chdir(folder)

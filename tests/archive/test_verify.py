@@ -111,6 +111,7 @@ def shard_of(folder):
     return sorted((folder / SWEEP / "shards").iterdir())[0]
 
 
+@pytest.mark.long
 def test_what_is_as_it_was_made_passes(made, tmp_path):
     for path, kind in ((zipped(made, tmp_path / "a.zip"), "archive"), (made, "unpacked archive")):
         report = verify(path)
@@ -120,6 +121,7 @@ def test_what_is_as_it_was_made_passes(made, tmp_path):
         assert report.lines()[-1] == f"nothing fails; not checked: {NO_LOGS}, {MOTION}"
 
 
+@pytest.mark.long
 def test_a_folder_of_results_is_checked_as_far_as_it_can_be(folder):
     report = verify(folder / "results")
     assert report.ok and report.kind == "folder of results" and report.checked["hdf5_files"] == 5
@@ -151,6 +153,7 @@ def test_links_and_pipes_are_named_and_not_followed(light, tmp_path):
     assert links == {"src/link.h5", "src/folder", RUN}
 
 
+@pytest.mark.long
 def test_a_result_that_its_job_did_not_make_is_named_by_its_log(light):
     """Though it is whole, and whoever put it there has renewed all digests of the archive."""
     told = light / "results/tiny/logs/trajectory/fall.log"
@@ -254,6 +257,7 @@ def test_a_manifest_that_is_none_is_named(light, change, words):
         ('{"@graph": [{"@id": "../../etc/passwd", "@type": "File"}]}', "missing, but described"),
     ],
 )
+@pytest.mark.long
 def test_a_description_that_is_wrong_is_named(light, text, words):
     (light / CRATE).write_text(text)
     assert any(words in problem.reason for problem in verify(light).problems)
@@ -302,6 +306,7 @@ def test_the_command_says_it_for_programs_and_for_scripts(light, capsys):
         ("1.0/run.h5", f"{NO_SEAL.format('1.0')}, {MOTION}"),
     ],
 )
+@pytest.mark.long
 def test_the_last_line_says_what_could_not_be_checked(file, words):
     report = verify(FORMATS / file)
     assert report.ok and report.lines()[-1] == f"nothing fails; not checked: {words}"

@@ -296,6 +296,7 @@ def test_a_process_that_fails_is_told():
         cold.run_all([cold.command("lissting")])
 
 
+@pytest.mark.long
 def test_help_and_imports_run():
     cases = {case.name: case for case in cold.cases(QUICK)}
     for name in ("help", "import_simulate", "import_sweep"):
@@ -317,6 +318,7 @@ def test_the_jobs_of_a_sweep_run(monkeypatch):
 
 
 @pytest.mark.skipif(shutil.which(octave.PROGRAM) is None, reason="GNU Octave is not installed")
+@pytest.mark.long
 def test_the_throw_in_octave_is_the_throw():
     """Through the first landing at 5 ms a step, where the kernel adds in the same order."""
     steps, h = 400, 5e-3

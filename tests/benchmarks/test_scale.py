@@ -85,6 +85,7 @@ def test_a_sweep_of_several_spans_cannot_be_made_smaller():
         of_size({"sweeps": {"own": {"stiffness": [span, span]}}}, 0.1)
 
 
+@pytest.mark.long
 def test_memory_is_that_of_the_process_asked_for_alone():
     """This one holds far more than the small one, and the kernel counts what a parent held when it started a child."""
     held = {}

@@ -267,6 +267,7 @@ def command(*arguments, **options):
     )
 
 
+@pytest.mark.long
 def test_the_same_command_gives_the_same_bytes(tmp_path):
     for name in ("a.h5", "b.h5"):
         assert command("run", SCENE, "-o", name, "--steps", "2000", cwd=tmp_path).returncode == 0

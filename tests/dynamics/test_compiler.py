@@ -46,6 +46,7 @@ def test_a_kernel_cut_short_anywhere_is_made_again(kernels):
         assert is_healed(kernels)
 
 
+@pytest.mark.long
 def test_a_kernel_with_any_bit_flipped_is_made_again(kernels):
     kernels.save("key", KERNEL)
     whole = kernels.path("key").read_bytes()
@@ -248,6 +249,7 @@ def chosen(folder, **places):
     return Path(done.strip())
 
 
+@pytest.mark.long
 def test_where_the_home_cannot_be_written_kernels_lie_with_temporary_files(tmp_path):
     (tmp_path / "nowhere").write_text("")
     first = chosen(tmp_path)

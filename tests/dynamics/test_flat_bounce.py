@@ -101,6 +101,7 @@ BOUNCES = [
 
 @pytest.mark.parametrize(("zeta", "speed"), BOUNCES)
 @pytest.mark.parametrize("law", CONTACT_LAWS)
+@pytest.mark.long
 def test_a_bounce_against_an_integration_of_the_force(law, zeta, speed):
     scene = scene_of(law, zeta)
     speed_in = speed * 9.8 / OMEGA

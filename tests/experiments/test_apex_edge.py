@@ -21,6 +21,7 @@ def found():
     )
 
 
+@pytest.mark.long
 def test_the_edge_is_the_predicted_one_whatever_the_duration(found):
     """Teeth are 1/n apart, 11 % at the lowest edge; a scan of 3 % may step over one, and never goes below.
 

@@ -47,6 +47,7 @@ def stepped(omega_h, phase):
     return speed**2
 
 
+@pytest.mark.long
 def test_the_map_is_what_bare_stepping_gives(measured):
     assert measured.energy_gain.dims == ("omega_h", "phase")
     assert (measured.omega_h[0], measured.omega_h[-1]) == (0.02, 1.98)

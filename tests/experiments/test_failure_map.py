@@ -54,6 +54,7 @@ def test_every_run_has_a_verdict_from_the_list(found):
     assert set(np.unique(found.verdict)) <= set(Verdict)
 
 
+@pytest.mark.long
 def test_verdicts_are_those_of_stepping(found):
     axis = found.attrs["axis"]
     chosen = failure_map.AXES[axis]

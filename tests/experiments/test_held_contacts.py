@@ -21,6 +21,7 @@ def dataset():
     return held_contacts.measure(scene, friction=FRICTION, stiffness=STIFFNESS, tolerance=TOLERANCE, launches=4)
 
 
+@pytest.mark.long
 def test_the_error_falls_with_the_tolerance_as_far_as_lsoda_can_tell(dataset):
     assert dataset.reference_error.max() < 1e-8
     for tolerance in TOLERANCE:

@@ -24,6 +24,7 @@ def measured(request):
     return rocking.measure(SCENES[request.param], zeta=ZETA)
 
 
+@pytest.mark.long
 def test_every_mode_goes_unstable_at_the_limit_of_theory(measured):
     assert measured.limit.dims == ("inertia", "mode", "zeta")
     theoretical = 2 * (np.sqrt(1 + np.square(ZETA)) - ZETA)

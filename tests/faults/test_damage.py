@@ -115,6 +115,7 @@ def read(shard, plan, pieces, change=lambda part: part):
     return list(checked_shard((change(part) for part in parts(shard, 7)), plan, pieces))
 
 
+@pytest.mark.long
 def test_the_shard_planned_is_passed_on_as_it_is(plan, shard):
     path, pieces = shard
     for passed, part in zip(read(path, plan, pieces), parts(path, 7), strict=True):

@@ -234,6 +234,7 @@ assert [os.waitpid(child, 0)[1] for child in children] == [0, 0, 0]
 """
 
 
+@pytest.mark.long
 def test_writers_of_one_file_at_once_all_succeed(tmp_path):
     done = subprocess.run([sys.executable, "-c", TWO], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -261,6 +262,7 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="other systems have n
 
 
 @linux
+@pytest.mark.long
 def test_a_process_ends_with_its_parent():
     child = "from stiffdice.io.process import end_with_parent; end_with_parent('python'); print(1, flush=True); input()"
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"

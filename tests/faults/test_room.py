@@ -84,6 +84,7 @@ def test_a_full_disk_is_told_and_the_same_command_goes_on(undisturbed, tmp_path,
 @mounted
 @pytest.mark.parametrize("name", ["results", ".snakemake"])
 @pytest.mark.parametrize("kind", ["read-only", "full"])
+@pytest.mark.long
 def test_a_folder_that_cannot_be_written_is_one_line_before_anything_is_done(undisturbed, tmp_path, name, kind):
     project = undisturbed.copy(tmp_path / "project")
     mounts = {
@@ -126,6 +127,7 @@ def test_a_full_tmp_and_a_full_home_do_no_harm(undisturbed, tmp_path):
 
 
 @mounted
+@pytest.mark.long
 def test_nowhere_to_keep_compiled_kernels_is_one_line(undisturbed):
     """Every place that Python would take for temporary files is read-only."""
     places = (

@@ -129,6 +129,7 @@ def missed(scheme, damping, steps, members=64):
 
 
 @ordered
+@pytest.mark.long
 def test_order_under_contact(scheme):
     for damping, order in zip((1.0, 0.0), CONTACT_ORDER[scheme], strict=True):
         errors = [missed(scheme, damping, steps) for steps in (250, 16_000)]
@@ -274,6 +275,7 @@ def test_magic_steps_conserve_a_bounces_energy_at_every_phase(n):
 
 
 @pytest.mark.parametrize("omega_h", [0.15, 0.6, 0.9, 1.2, 1.6, 1.9])
+@pytest.mark.long
 def test_off_the_magic_steps_a_bounce_gains_up_to_the_known_bound(omega_h):
     energies = np.array([bounced(omega_h, phase) for phase in np.linspace(0.002, 0.998, 400)])
     bound = 1 / (1 - omega_h**2 / 4)

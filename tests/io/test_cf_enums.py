@@ -41,6 +41,7 @@ def test_files_keep_the_cf_conventions(written, tmp_path, suite, kind):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.long
 def test_the_checker_sees_what_is_wrong(written, tmp_path, suite):
     import netCDF4
 

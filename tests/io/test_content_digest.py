@@ -58,6 +58,7 @@ def all_parts(paths, cells=100):
     return itertools.chain.from_iterable(parts(path, cells) for path in paths)
 
 
+@pytest.mark.long
 def test_how_cells_are_dealt_does_not_count(dealt):
     assert (len(dealt[1]), len(dealt[4])) == (6, 2)
     digests = {

@@ -41,6 +41,7 @@ def test_what_is_not_is_refused_by_name(stored, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a b\nc.h5", "ü.h5", "'", "\udcff.h5"])
+@pytest.mark.long
 def test_any_name_can_be_asked_for(stored, tmp_path, name):
     path = tmp_path / name
     path.write_bytes(stored.read_bytes())
@@ -67,6 +68,7 @@ def test_a_file_that_makes_the_library_crash_is_refused_and_the_next_is_tried(st
 
 
 @pytest.mark.parametrize("ended", [0, 1, 2])
+@pytest.mark.long
 def test_a_file_that_ends_the_child_is_refused_and_those_after_it_are_tried(stored, monkeypatch, ended):
     """What the HDF5 library does to the child on a file that was made to, done to its answers."""
     others = [stored.with_name(f"{name}.h5") for name in "abc"]

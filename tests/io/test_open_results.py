@@ -25,6 +25,7 @@ FORMATS = Path(__file__).parents[1] / "reference" / "formats"
         ("shard", {"contact": "ungated"}, 0),
     ],
 )
+@pytest.mark.long
 def test_a_word_selects_what_its_number_does(name, selection, number):
     path = FORMATS / "1.2" / f"{name}.h5"
     found = stiffdice.open_results(path).sel(selection)

@@ -18,6 +18,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
 
 
 @pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier", "experiment"])
+@pytest.mark.long
 def test_what_is_written_is_as_the_format_says(written, kind):
     dataset = open_file(written[kind])
     assert dataset.attrs["kind"] == kind

@@ -203,6 +203,7 @@ except OutputError as error:
 
 
 @pytest.mark.parametrize("room", [100, 500_000])
+@pytest.mark.long
 def test_a_full_disk_is_one_line_and_leaves_what_was_there(tmp_path, room):
     """A limit on the file size stands for the disk: what HDF5 holds back shows only when the file is closed.
 

@@ -54,6 +54,7 @@ def test_a_huge_file_is_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "a: " * 5000, "&a [*a", "{" * 2000])
+@pytest.mark.long
 def test_nonsense_is_one_line(text):
     with pytest.raises(InputError) as caught:
         yaml_loader.parse(text)

@@ -60,6 +60,7 @@ def test_a_ground_that_keeps_all_the_speed_has_no_damping():
 
 
 @given(laws, st.floats(0.01, 1), st.floats(1e-6, 1), st.floats(1e-3, 1e3))
+@pytest.mark.long
 def test_a_ground_of_a_contact_time_pushes_for_so_long(law, restitution, contact_time, mass):
     """Followed along the oscillator of each leg: at the end it neither pushes nor pulls, at e times the speed."""
     stiffness = flat_landing.stiffness(law, restitution, contact_time, mass)

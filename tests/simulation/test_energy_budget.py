@@ -79,6 +79,7 @@ def clearance_of(scene, states):
 
 @for_all
 @pytest.mark.parametrize("steps", [300, 3_000, 100_000])
+@pytest.mark.long
 def test_the_parts_add_up_to_the_change_of_the_energy(scheme, model, contact, steps):
     scene = rough(contact, model)
     kept = ledger(scene, model=model, scheme=scheme, steps=steps)

@@ -26,6 +26,7 @@ def both(scene, steps, **options):
 @pytest.mark.parametrize(
     ("square", "rate"), [(0, 0), (0, 1e-9), (0, 0.7), (0, 2e3), (4e4, 0), (4e4, 3), (1e-6, 2), (100, 1e3), (1e-9, 1e-9)]
 )
+@pytest.mark.long
 def test_many_steps_at_once_are_as_many_steps(square, rate, steps):
     place, speed, constant, h = 0.3, -1.7, -9.8, 1e-4
     moved, end = symplectic_euler.swing(place, speed, h, steps, square, rate, constant)

@@ -133,6 +133,7 @@ tilts = st.tuples(st.integers(-99, 99), st.integers(-99, 99)).map(lambda tilt: [
     st.floats(0, 20),
     st.integers(20, 3000),
 )
+@pytest.mark.long
 def test_any_flight_and_its_first_contact(model, contact, velocity, spin, normal, height, gravity, steps):
     """Until a tenth of a second after the first touch-down: from then on round-off may grow."""
     launch = {"position": [0, 0, height * 1.5], "velocity": velocity, "angular_momentum": spin}

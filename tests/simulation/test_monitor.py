@@ -83,6 +83,7 @@ def test_members_touch_down_at_evenly_spread_phases(contact, steps):
 @pytest.mark.parametrize("model", ["sliding", "tumbling"])
 @pytest.mark.parametrize("normal", [[0, 0, 1], [0.1, -0.2, 1]], ids=["flat", "slope"])
 @pytest.mark.parametrize("steps", [500, 3000])
+@pytest.mark.long
 def test_clearance_is_exact_near_the_ground_and_never_too_much(model, normal, steps):
     """Which steps are in the air is known to the last bit; far up a lower bound will do."""
     ground = {"stiffness": 1e3, "contact": "gated", "normal": normal}

@@ -135,6 +135,7 @@ def test_a_shards_name_tells_what_it_computes(sweep_of):
 @pytest.mark.parametrize(
     ("early_stop", "refine", "kept"), [(False, 0, True), (True, 0, False), (False, 1, False), (True, 1, False)]
 )
+@pytest.mark.long
 def test_another_tolerance_needs_other_runs_only_where_runs_depend_on_it(sweep_of, early_stop, refine, kept):
     fixed = {"early_stop": early_stop, "refine": refine}
     before = names(sweep_of(**fixed, criteria={"energy": 0.05, "apex": 0.02}))

@@ -81,6 +81,7 @@ def planned(asked):
 
 @read_each
 @given(asked=sweeps)
+@pytest.mark.long
 def test_a_study_asks_for_what_is_in_its_file(load, asked):
     try:
         _, sweep = load(asked)
@@ -126,6 +127,7 @@ def test_a_columns_scan_is_its_own_whatever_else_is_in_the_sweep(asked, data):
 
 
 @given(sweeps, st.data())
+@pytest.mark.long
 def test_a_shards_name_is_of_what_it_computes_and_of_nothing_else(asked, data):
     sweep = planned(asked)
     assert partition.of(planned(copy.deepcopy(asked))) == partition.of(sweep)

@@ -278,6 +278,7 @@ def test_needs_are_as_the_workflow_has_them(study):
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "config").glob("*.yaml")))
+@pytest.mark.long
 def test_every_study_of_the_project_can_be_told(name, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
     found = status.of(studies.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml"), tmp_path)

@@ -64,6 +64,7 @@ def test_other_tolerances_judge_the_same_runs(tmp_path):
     ],
 )
 @pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.long
 def test_shards_of_different_sweeps_are_not_mixed(tmp_path, change, told, order):
     cheap = {"omega_h": {"from": 3.0, "to": 2.0, "count": 2}}
     shards = [

@@ -79,6 +79,7 @@ def computed(plan):
         ("tumbling", "gated", {"criteria": ALL}),
     ],
 )
+@pytest.mark.long
 def test_jobs_of_equal_cost_compute_about_equally_many_steps(model, contact, asked):
     """Eight jobs on three grounds: the longest is less than twice the median."""
     predicted, counted = [], []

@@ -38,6 +38,7 @@ def test_every_cell_is_in_one_shard_and_in_order(asked):
 
 
 @given(sweeps)
+@pytest.mark.long
 def test_no_shard_is_longer_than_asked_by_more_than_half_and_a_cell(asked):
     sweep = planned(asked | {"seconds_per_job": 0.003})
     for shard in first_round(sweep).values():
@@ -47,6 +48,7 @@ def test_no_shard_is_longer_than_asked_by_more_than_half_and_a_cell(asked):
 
 
 @given(sweeps)
+@pytest.mark.long
 def test_no_round_has_more_shards_than_it_may_have_cells(asked):
     """However short the jobs: a million jobs of nothing would be a plan for nobody."""
     sweep = planned(asked | {"seconds_per_job": 1e-9, "refine": 2})

@@ -227,6 +227,7 @@ def stepped(scene, steps, late):
 
 
 @pytest.mark.parametrize("duration", [2.0, 10.0], ids=["first bounce", "whole run"])
+@pytest.mark.long
 def test_a_sweep_against_plain_numpy(tmp_path, duration):
     """The first bounce to round-off; after many, which amplify it, how many members pass."""
     members = 32

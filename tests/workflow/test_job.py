@@ -70,6 +70,7 @@ def run(*lines: str, log) -> subprocess.CompletedProcess[str]:
     return subprocess.run(script(*lines, log=log), capture_output=True, text=True, check=False)
 
 
+@pytest.mark.long
 def test_a_job_that_does_what_it_should(tmp_path):
     log = tmp_path / "log"
     ended = run(IN_BLOCK + "say('simulation: 1.000 s')", log=log)
@@ -99,6 +100,7 @@ NO_HANDLES = (
         ("import nowhere", 1, "a mistake in the program: ModuleNotFoundError: No module named 'nowhere'"),
     ],
 )
+@pytest.mark.long
 def test_an_error_is_the_last_word(tmp_path, line, status, reason):
     """And what is said aloud is one line, in which the log is named; a traceback only in the log, if at all."""
     log = tmp_path / "log"

@@ -65,6 +65,7 @@ def visited(page, *clicks):
     return SimpleNamespace(**json.loads(unescape(found[1])))
 
 
+@pytest.mark.long
 def test_a_script_in_a_page_would_be_seen(tmp_path):
     page = tmp_path / "page.html"
     page.write_text(f"<title>whole</title><p>{TITLE}</p>")

@@ -71,6 +71,7 @@ def test_a_job_is_a_child_of_the_warm_process(warm, tmp_path):
     assert log.read_text().splitlines()[2] == str(warm.pid)
 
 
+@pytest.mark.long
 def test_jobs_at_once_have_their_own_words_and_share_nothing(warm, tmp_path):
     """What a job prints arrives where its script prints; what it does to a module, no other job sees."""
     bodies = [f"import math; print(math.pi, flush=True); math.pi = {number}" for number in range(4)]
@@ -88,6 +89,7 @@ def test_a_job_ends_with_the_script_that_waits_for_it(warm, tmp_path):
     assert begun(tmp_path, "two", "say('made')")[0].wait() == 0  # and the warm process goes on
 
 
+@pytest.mark.long
 def test_jobs_end_with_the_warm_process_and_later_ones_do_without(warm, tmp_path):
     script, log = begun(tmp_path, "one", LONG)
     until(lambda: at_work(log))

@@ -79,6 +79,7 @@ def slip_of(contact, motion):
     return np.hypot(velocity[0], velocity[1])
 
 
+@pytest.mark.long
 def test_a_node_held_by_friction_stays_held_over_long_steps():
     """Over a hundredth of a bounce and more, against steps that follow the cutoff, a millionth as long."""
     contact, start = pressed(0.0)

@@ -85,6 +85,7 @@ def test_a_tumbling_throw_agrees_with_other_integrators(stiffness, agreement):
 HELD = (0.11094238, 0.61472022, 0.5124655)
 
 
+@pytest.mark.long
 def test_a_corner_held_by_friction_agrees_with_a_stiff_integrator():
     scene = throw(1e8, spin=HELD)
     own, _ = places(scene, 1e-11)

@@ -59,6 +59,7 @@ def test_axes_have_units_and_say_whether_work_or_time_is_shown(data, timings, na
         assert {panel.get_xscale() for panel in panels} == {panel.get_yscale() for panel in panels} == {"log"}
 
 
+@pytest.mark.long
 def test_errors_are_drawn_against_work_one_line_for_each_method(data):
     flat = data["flat"]
     names = meanings_of(flat.method)
@@ -81,6 +82,7 @@ def test_the_floor_is_drawn_and_within_the_axes(data):
         assert panel.get_ylim()[0] < low
 
 
+@pytest.mark.long
 def test_times_that_were_not_taken_are_hollow(data, timings):
     panel = drawn("work-precision", data | timings).axes[0]
     look = methods.look_of("symplectic_euler")
@@ -157,6 +159,7 @@ def texts(figure):
     return " ".join(part.get_text().replace("\n", " ") for part in figure.texts)
 
 
+@pytest.mark.long
 def test_axes_of_engines_have_units(limits, speed, throw):
     for name, data in {"engine-limits": limits, "engine-speed": speed, "engine-throw": throw}.items():
         for panel in drawn(name, {"name": data}).axes:

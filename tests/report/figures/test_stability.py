@@ -174,6 +174,7 @@ def test_the_papers_steps_are_those_of_its_stiffness_only(combs):
     assert not any("paper" in text.get_text() for text in legend.get_texts())
 
 
+@pytest.mark.long
 def test_the_comb_has_a_panel_for_each_stiffness(maps):
     figure = drawn("pass-fraction", {"undamped": maps["undamped"]})
     assert [

@@ -60,6 +60,7 @@ def test_the_papers_limits_are_predicted_by_formula_and_found_by_bisection(measu
 
 
 @pytest.mark.parametrize("omega_h", [0.2, 0.7])
+@pytest.mark.long
 def test_round_off_grows_in_a_bounce_with_the_step(omega_h):
     dataset = measure(Scene(), omega_h=omega_h)
     assert by_name(dataset, "measured")["growth"] == pytest.approx(by_name(dataset, "predicted")["growth"], rel=0.15)

@@ -76,6 +76,7 @@ def test_it_is_the_largest_airborne_energy_above_that_of_rest(model, normal, sti
     assert run.measures["energy_ratio"][0] == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.long
 def test_it_counts_only_the_air():
     """In the ground kinetic + m g z says nothing: the springs are not in it."""
     scene = from_mapping({})

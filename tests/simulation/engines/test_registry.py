@@ -60,6 +60,7 @@ def test_a_transcription_of_the_paper_is_our_scheme(engine, model, preset, mappi
 @octave
 @pytest.mark.parametrize("model", ["vertical", "flying"])
 @pytest.mark.parametrize("preset", ["as_listed", "as_written"])
+@pytest.mark.long
 def test_two_transcriptions_are_one_model(model, preset):
     mapping = {"launch": {"position": [0, 0, 1], "angular_momentum": [0.3, 0.5, 0.2]}}
     scene = from_mapping(mapping, preset)
@@ -299,6 +300,7 @@ def test_octave_ends_with_who_asked_it(end):
 
 
 @octave
+@pytest.mark.long
 def test_an_octave_that_is_terminated_leaves_no_file_behind(tmp_path):
     from stiffdice.simulation.engines.octave import PROGRAM, SCRIPT
 

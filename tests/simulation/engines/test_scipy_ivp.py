@@ -104,6 +104,7 @@ def test_a_peer_that_is_not_there_is_told(monkeypatch):
         engines.ready("engine", Scene(), "sliding", 4, 4)
 
 
+@pytest.mark.long
 def test_scipy_is_imported_by_its_peers_only_and_these_by_whom_they_are_asked_for():
     """Numba may look for SciPy on its own."""
     asking = re.compile(r"^\s*(import|from) scipy", re.MULTILINE)
