@@ -14,7 +14,7 @@ rule trajectory:
     benchmark:
         "results/{study}/benchmarks/trajectory/{run}.{preset}.tsv"
     resources:
-        mem_mb=growing(500),
+        mem_mb=growing(700),
         runtime=growing(5),
     conda:
         "../envs/stiffdice.yaml"

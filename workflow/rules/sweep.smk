@@ -18,7 +18,7 @@ rule shard:
         "results/{study}/benchmarks/shard/{sweep}/{shard}.tsv"
     priority: 10
     resources:
-        mem_mb=growing(700),
+        mem_mb=growing(900),
         runtime=lambda wildcards, attempt: minutes_of(shard_of(wildcards)) * 2 ** (attempt - 1),
     conda:
         "../envs/stiffdice.yaml"
