@@ -71,10 +71,11 @@ class KernelFiles:
     def alone(self, key: object, wait: bool) -> Iterator[bool]:
         """Give whether no other process is in such a block for the same key; wait: until none is.
 
-        Where the file system has no locks, all are let in: each compiles for itself.
+        Where the file system has no locks, or no room for them, all are let in: each compiles for itself.
         """
-        handle, place = _locks(), int(self.path(key).suffixes[-2][1:], 16) >> 2
+        place = int(self.path(key).suffixes[-2][1:], 16) >> 2
         try:
+            handle = _locks()
             fcntl.lockf(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, place)
         except (BlockingIOError, PermissionError):
             yield False
