@@ -168,7 +168,7 @@ def test_a_job_that_needs_more_memory_gets_it(project, local):
     rules = project.folder / "workflow" / "rules" / "common.smk"
     growing = "amount * 2 ** (attempt - 1)"
     assert growing in rules.read_text()
-    rules.write_text(rules.read_text().replace(growing, "amount // 7 * 2 ** (attempt - 1)"))  # too little at first
+    rules.write_text(rules.read_text().replace(growing, "amount // 9 * 2 ** (attempt - 1)"))  # too little at first
     shards = sorted(name for name in local if "/shards/" in name)
     said = project.start("slurm", SHARDS_ONLY, f"--jobs={len(shards)}").end()
     asked = [memory for comment, memory in jobs("Comment,ReqMem") if comment.startswith("rule_shard_wildcards_small")]
