@@ -125,14 +125,15 @@ def build(root: Path, new: Path, held: int) -> None:
         again = [python, str(root / "requirements/install_engines.py"), str(root / "requirements"), *there]
         call(again, held)
     print("stiffdice: compiling packages and, beside them, the kernels of `make paper` (about 20 s)", flush=True)
-    beside = Thread(target=call, args=([python, str(root / "workflow/compile_kernels.py"), "paper"], held, True))
+    kernels = [python, str(root / "workflow/compile_kernels.py"), "paper"]
+    beside = Thread(target=call, args=(kernels, held), kwargs={"silent": True})
     beside.start()
-    call([python, "-m", "compileall", "-q", "-j", "0", str(new)], held, True)
+    call([python, "-m", "compileall", "-q", "-j", "0", str(new)], held, silent=True)
     beside.join()
     (new / ".installed").write_text(digest(root) + "\n", encoding="ascii")
 
 
-def call(command: list[str], held: int, silent: bool = False) -> int:
+def call(command: list[str], held: int, *, silent: bool = False) -> int:
     """Run a command, which inherits the locked file, and return its exit status."""
     environment = os.environ | QUIET
     return subprocess.run(command, check=False, env=environment, pass_fds=[held], capture_output=silent).returncode
@@ -154,7 +155,7 @@ def empty(venv: Path, held: int) -> list[str]:
         (shutil.which("uv"), ["uv", "venv", "--quiet", "--seed", "--python", python], own),
     ]
     for there, command, pip in ways:
-        if there and call([*command, str(venv)], held, True) == 0:
+        if there and call([*command, str(venv)], held, silent=True) == 0:
             return pip
         shutil.rmtree(venv, ignore_errors=True)
     raise SetUpError(

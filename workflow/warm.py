@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT / "workflow" / "scripts"), str(ROOT / "src")]
 import job  # noqa: E402
 
 from stiffdice.errors import StiffdiceError  # noqa: E402
-from stiffdice.io.process import end_with_parent  # noqa: E402
+from stiffdice.io.process import end_with_parent, forked  # noqa: E402
 
 _MODULES = (
     *("stiffdice.simulation.dataset", "stiffdice.simulation.energy_budget", "stiffdice.sweep.shard"),
@@ -117,14 +117,8 @@ def load(names: list[str]) -> Iterator[None]:
                 if not warm_up.load(run):
                     missing.append(run)
                 yield
-    if missing and not os.fork():
-        # Jobs of one kind all wait for the same kernel; a core is free for those of the next.
-        try:
-            end_with_parent("warm.py")
-            for run in missing:
-                warm_up.compile_kernels(run)
-        finally:
-            os._exit(0)
+    if missing:  # jobs of one kind all wait for the same kernel; a core is free for those of the next
+        forked(lambda: [warm_up.compile_kernels(run) for run in missing], "warm.py")
 
 
 def main() -> NoReturn:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from concurrent.futures import ThreadPoolExecutor
 
 HELP = "say what a file holds: its verdict, its scene, its variables"
 EXAMPLES = """\
@@ -24,6 +23,8 @@ def add(inspect: argparse.ArgumentParser) -> None:
 
 def call(options: argparse.Namespace) -> None:
     """Print what the file holds."""
+    from concurrent.futures import ThreadPoolExecutor
+
     from stiffdice.io import isolation
 
     with ThreadPoolExecutor(1) as another:

@@ -110,7 +110,8 @@ def _locks() -> int:
 class _Locator(UserProvidedCacheLocator):
     """The folder chosen for kernels, and no other: the others that numba tries would serve stale kernels.
 
-    A kernel is known by the digest of its sources, wherever they lie: a copy of the project compiles nothing again.
+    A kernel is known by the digest of its sources, wherever they lie: a copy of the project compiles nothing again. Of
+    one outside the package, a benchmark's, that is its own file.
     """
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:

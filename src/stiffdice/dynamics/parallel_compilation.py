@@ -8,10 +8,10 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, only_stored
-from stiffdice.io.process import end_with_parent
+from stiffdice.io.process import forked
 
 _Due = Sequence[tuple[Any, tuple[Any, ...]]]  # kernels, each with the types of its arguments
 
@@ -55,9 +55,7 @@ def _can_fork() -> bool:
 @contextlib.contextmanager
 def _another(due: _Due) -> Iterator[None]:
     """Let a forked process compile, too, while the block lasts."""
-    child = os.fork()
-    if child == 0:
-        _help(due)
+    child = forked(lambda: _help(due), "python")
     try:
         yield
     except BaseException:
@@ -67,11 +65,7 @@ def _another(due: _Due) -> Iterator[None]:
         os.waitpid(child, 0)
 
 
-def _help(due: _Due) -> NoReturn:
-    """Compile what is free, and end; what goes wrong goes wrong in the parent, too, which tells."""
-    try:
-        end_with_parent("python")
-        TELLING.set(None)
-        _compile_the_free(due)
-    finally:
-        os._exit(0)
+def _help(due: _Due) -> None:
+    """Compile what is free, and say nothing; what goes wrong goes wrong in the parent, too, which tells."""
+    TELLING.set(None)
+    _compile_the_free(due)

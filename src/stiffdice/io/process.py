@@ -1,4 +1,4 @@
-"""A process that does not outlive the one that started it, so that after a kill nothing of an earlier run goes on."""
+"""Processes that do not outlive the one that started them, so that after a kill nothing of an earlier run goes on."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ctypes
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1  # of linux/prctl.h
@@ -24,3 +25,18 @@ def end_with_parent(name: str) -> None:
         inherited = os.getppid() == _INIT
         if inherited and name not in Path(f"/proc/{_INIT}/cmdline").read_text(encoding="utf-8", errors="replace"):
             os.kill(os.getpid(), signal.SIGKILL)
+
+
+def forked(work: Callable[[], object], name: str) -> int:
+    """Return the number of a child that does some work, and ends with it, or with this process; nobody is told how.
+
+    name: as of `end_with_parent`.
+    """
+    child = os.fork()
+    if child == 0:
+        try:
+            end_with_parent(name)
+            work()
+        finally:
+            os._exit(0)
+    return child
