@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import rotated
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import Scene, from_mapping
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import Ensemble, rotated, start_of
+from stiffdice.dynamics.state import Ensemble, start_of
 from stiffdice.integrators.registry import LAGS, SCHEMES, unfit
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.outcome import BLOW_UP, Verdict
 from stiffdice.simulation.run import simulate

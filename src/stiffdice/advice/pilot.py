@@ -17,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics.model_selection import least_model
-from stiffdice.dynamics.state import Array, along
+from stiffdice.dynamics.state import Array
 from stiffdice.experiments.measuring import states_of
 from stiffdice.integrators import registry as schemes
+from stiffdice.scene.rotation import along
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.run import simulate

@@ -90,3 +90,18 @@ def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
         raise TypeError("chosen by the type of the tag")
 
     return Compiled(call, bodies, {"forceinline": inlined})
+
+
+def _lanes() -> Any:
+    from stiffdice.dynamics import lanes
+
+    return lanes
+
+
+# Numbers of several members side by side, in compiled code; `lanes.py` says what there is of them. load(array, row,
+# width): a row of an array of doubles, shape (row, width). store(array, row, value): keep lanes there. where(mask, yes,
+# no): `yes` in the lanes of the mask and `no` in the others. bits(mask): a whole number, lane k its bit k.
+load: Any = Intrinsic(_lanes, "load")
+store: Any = Intrinsic(_lanes, "store")
+where: Any = Intrinsic(_lanes, "where")
+bits: Any = Intrinsic(_lanes, "bits")

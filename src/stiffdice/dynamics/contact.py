@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from stiffdice.dynamics.compilation import njit
-from stiffdice.dynamics.simd import where
+from stiffdice.dynamics.compilation import njit, where
 from stiffdice.dynamics.vector import Vector, cross, dot, inlined, norm, plus, plus_times, row, times, vector
 
 # (fx, fy, fz, torque_x, torque_y, torque_z)

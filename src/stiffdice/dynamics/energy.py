@@ -8,21 +8,22 @@ import numpy as np
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import height_of, normal_of
+from stiffdice.dynamics.inertia import turning_energy
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Physics, States
 from stiffdice.dynamics.vector import Vector, dot, plus_times, row, vector
 
 
 @njit
-def _moving(physics: Physics, velocity: Vector, momentum: Vector) -> float:
-    """Return m u²/2 + L²/(2 I) [J], as in the throw listing."""
-    return 0.5 * physics.mass * dot(velocity, velocity) + 0.5 * dot(momentum, momentum) / physics.inertia
+def _moving(physics: Physics, state: Any, velocity: Vector, momentum: Vector) -> float:
+    """Return m u²/2 + L·ω/2 [J] of a body turned as in a state, as in the throw listing."""
+    return 0.5 * physics.mass * dot(velocity, velocity) + turning_energy(physics.body, physics, state, momentum)
 
 
 @njit
 def kinetic(physics: Physics, state: Any) -> float:
     """Return the kinetic energy of translation and rotation [J]."""
-    return _moving(physics, vector(state.velocity), vector(state.angular_momentum))
+    return _moving(physics, state, vector(state.velocity), vector(state.angular_momentum))
 
 
 @njit
@@ -34,7 +35,7 @@ def kinetic_at_place(model: Any, physics: Physics, state: Any, lag_time: float) 
     """
     wrench = models.force(model, physics, state)
     velocity = plus_times(vector(state.velocity), lag_time / physics.mass, vector(wrench))
-    return _moving(physics, velocity, plus_times(vector(state.angular_momentum), lag_time, vector(wrench[3:])))
+    return _moving(physics, state, velocity, plus_times(vector(state.angular_momentum), lag_time, vector(wrench[3:])))
 
 
 @njit

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.state import Array
+from stiffdice.dynamics.state import Array, turned_tensor
 from stiffdice.scene.scene import Scene
 
 STABILITY_LIMIT = 2.0  # below this ωh symplectic Euler without damping is linearly stable
@@ -96,12 +96,17 @@ def largest_gain(omega_h: float) -> float:
 def contact_modes(scene: Scene, offsets: Array, touching: npt.NDArray[np.bool_ | np.intp]) -> Array:
     """Return ω² [rad²/s²] of the modes of a rigid cube that stands on some of its nodes, ascending, shape (4,).
 
-    offsets: nodes relative to the centre [m], shape (node, 3). touching: mask or indices of those on the ground. The
-    coordinates are the displacement along the ground's normal n and the rotation vector; a node r moves along n by
-    J = (1, r × n) of them, so that ω² are the eigenvalues of M⁻¹ S Σ JᵀJ, M = diag(m, I, I, I). A mode without a
-    spring has 0. Contact shallow against the side: the torque by which a force topples a cube is left out.
+    offsets: nodes relative to the centre of mass [m], shape (8, 3). touching: mask or indices of those on the ground.
+    The coordinates are the displacement along the ground's normal n and the rotation vector; a node r moves along n by
+    J = (1, r × n) of them, so that ω² are the eigenvalues of M⁻¹ S Σ JᵀJ, M of the mass and the tensor of inertia. A
+    mode without a spring has 0. Contact shallow against the side: the torque by which a force topples a cube is left
+    out.
     """
     arms = np.cross(offsets[touching], scene.ground.normal)
-    rows = np.column_stack([np.full(len(arms), scene.cube.mass**-0.5), arms * scene.cube.moment_of_inertia**-0.5])
+    if scene.cube.distribution.is_isotropic:
+        levers = arms * scene.cube.moment_of_inertia**-0.5
+    else:
+        levers = arms @ np.linalg.cholesky(np.linalg.inv(turned_tensor(scene.cube, offsets)))
+    rows = np.column_stack([np.full(len(arms), scene.cube.mass**-0.5), levers])
     squares: Array = np.linalg.eigvalsh(scene.ground.stiffness * rows.T @ rows)
     return np.maximum(squares, 0.0)  # round-off around the modes without a spring

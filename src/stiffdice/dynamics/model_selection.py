@@ -21,9 +21,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import Array, along, physics_of, start_of
+from stiffdice.dynamics.state import Array, physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
+from stiffdice.scene.rotation import along
 from stiffdice.scene.scene import Scene
 
 AUTO, AS_ASKED = "auto", "as asked"
@@ -38,6 +39,13 @@ _ORDER = ("flying", "vertical", "sliding", "tumbling")
 ROUND_OFF = 1e-14
 # In units of all lengths in a flight: far above what its round-off can add up to.
 _MARGIN = 1e-9
+
+# Why the ground turns a cube that touches it without spin.
+_CENTRE = "the centre of mass is not that of the nodes, so that the ground turns the cube"
+_TILT = (
+    "the cube does not land flat, and on an edge or a corner the ground turns it, from the slightest tilt if it is "
+    "balanced"
+)
 
 
 def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
@@ -59,12 +67,8 @@ def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
         reason = "the cube never reaches the ground nor moves towards it, so its weight alone moves it"
     elif any(scene.launch.spin):
         name, reason = "tumbling", "the cube spins"
-    elif not clear and not lands_flat(scene):
-        name = "tumbling"
-        reason = (
-            "the cube does not land flat, and on an edge or a corner the ground turns it, from the slightest tilt if "
-            "it is balanced"
-        )
+    elif scene.cube.distribution.centre.any() or not (clear or lands_flat(scene)):
+        name, reason = "tumbling", _CENTRE if scene.cube.distribution.centre.any() else _TILT
     elif not clear and ground.friction > 0 and not straight:
         name, reason = "tumbling", "the cube lands flat, but friction tips it as it slides"
     elif not clear and not _stays_above(scene):
@@ -79,8 +83,10 @@ def least_model(scene: Scene, longest_step: float = 0.0) -> tuple[str, str]:
         else:
             reason = "the cube lands flat without spin and "
             reason += f"nothing moves it {aside}" if straight else "there is no friction to tip it"
-    if name == "tumbling":
+    if name == "tumbling" and scene.cube.distribution.is_isotropic:
         reason += "; its inertia, the same about every axis, needs no tensor that turns with it"
+    elif name == "tumbling":
+        reason += "; its tensor of inertia turns with it"
     return name, f"{name}: {reason}"
 
 
@@ -110,7 +116,7 @@ def lands_flat(scene: Scene, tolerance: float = ROUND_OFF) -> bool:
     tolerance: of their heights, in units of the side.
     """
     heights = np.sort(_heights(scene))
-    return bool(heights[3] - heights[0] <= tolerance * scene.cube.side < heights[4] - heights[0])
+    return bool(heights[3] - heights[0] <= tolerance * 2 * min(scene.cube.half_sides) < heights[4] - heights[0])
 
 
 def _heights(scene: Scene) -> Array:
@@ -151,7 +157,11 @@ def _stays_above(scene: Scene) -> bool:
     It needs the energy 2 S (s/2)² of four springs to get there. What it has along the normal nothing adds to.
     """
     height, speed = _along(scene, scene.launch.position), _along(scene, scene.launch.velocity)
-    pull, half, springs = scene.gravity * scene.ground.normal[2], scene.cube.side / 2, 2 * scene.ground.stiffness
+    pull, half, springs = (
+        scene.gravity * scene.ground.normal[2],
+        -float(_heights(scene).min()),
+        2 * scene.ground.stiffness,
+    )
     depth = max(0.0, half - height)
     energy = scene.cube.mass * (speed * speed / 2 + pull * height) + springs * depth * depth
     return height > 0 and energy < springs * half * half

@@ -1,17 +1,17 @@
-"""What a kernel works on: the state of one rigid body, and the physics it moves in; and rotations of nodes."""
+"""What a kernel works on: the state of one rigid body, and the physics it moves in."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from stiffdice.dynamics.inertia import body_of
 from stiffdice.errors import InputError
-from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.cube import SIGNS, Cube
 from stiffdice.scene.flat_landing import CONTACT_LAWS
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ class Physics(NamedTuple):
 
     mass: float
     gravity: float
-    inertia: float
+    inertia: float  # [kg m²] the least moment of one whose moments differ
     stiffness: float
     damping: float
     friction: float
@@ -56,7 +56,8 @@ class Physics(NamedTuple):
     weight: float  # [N] of all nodes, summed one by one as the listings sum forces
     reach: float  # [m] no node is farther from the centre
     radius: float  # [m] the cube's nominal one
-    side: float  # [m]
+    side: float  # [m] the shortest
+    body: Any  # of `inertia.py`: how it turns
 
 
 def physics_of(scene: Scene) -> Physics:
@@ -70,8 +71,9 @@ def physics_of(scene: Scene) -> Physics:
     reach = float(np.linalg.norm(nodes, axis=1).max()) * (1 + 1e-6)
     forces = ground.stiffness, ground.damping, ground.friction, *CONTACT_LAWS[ground.contact]
     plane = *ground.normal, 1e-6 * cube.radius
-    sizes = reach, cube.radius, cube.side
-    return Physics(cube.mass, scene.gravity, cube.moment_of_inertia, *forces, *plane, node_weight, weight, *sizes)
+    sizes = reach, cube.radius, 2 * min(cube.half_sides)
+    weights = node_weight, weight
+    return Physics(cube.mass, scene.gravity, cube.least_moment, *forces, *plane, *weights, *sizes, body_of(cube))
 
 
 # The models that turn the cube; the others leave its spin out.
@@ -98,12 +100,29 @@ def start_of(scene: Scene, model: str) -> States:
                 "the cube up and down only"
             )
         state["velocity"][:, :2] = 0.0
+    state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
     if model in TURNING:
         state["angular_momentum"] = launch.spin
         if launch.node_velocity == "rigid":
-            state["angular_velocity"] = state["angular_momentum"] / scene.cube.moment_of_inertia
-    state["node_offset"] = rotated(scene.cube.node_offsets(), np.array(launch.orientation))
+            state["angular_velocity"] = spin_of(scene.cube, state[0])
     return state
+
+
+def spin_of(cube: Cube, state: Any, nodes: Array | None = None) -> Array:
+    """Return the spin [rad/s] that a STATE record's angular momentum gives a cube, shape (3,).
+
+    nodes: those by which the cube is turned, shape (8, 3); None takes the state's own.
+    """
+    momentum = np.asarray(state["angular_momentum"])
+    if cube.distribution.is_isotropic:
+        return momentum / cube.moment_of_inertia
+    return np.asarray(np.linalg.solve(turned_tensor(cube, state["node_offset"] if nodes is None else nodes), momentum))
+
+
+def turned_tensor(cube: Cube, nodes: Array) -> Array:
+    """Return the tensor of inertia [kg m²], shape (3, 3), of a cube whose nodes, shape (8, 3), are turned like this."""
+    edges = np.einsum("ke,kx->ex", SIGNS, nodes) / len(SIGNS) / np.array(cube.half_sides)[:, None]
+    return np.asarray(edges.T @ cube.distribution.tensor @ edges)
 
 
 class Ensemble(NamedTuple):
@@ -111,22 +130,6 @@ class Ensemble(NamedTuple):
 
     launches: States
     late: Array
-
-
-def along(vectors: Array, direction: Sequence[float] | Array) -> Array:
-    """Return the components of vectors, shape (..., 3), in a direction; BLAS has other digits on other processors."""
-    x, y, z = direction
-    return np.asarray(vectors[..., 0] * x + vectors[..., 1] * y + vectors[..., 2] * z)
-
-
-def rotated(offsets: Array, rotation: Array) -> Array:
-    """Return offsets, shape (node, 3), turned by a rotation vector [rad] (Rodrigues' formula, equation 9)."""
-    angle = math.hypot(*rotation)
-    if angle == 0:
-        return offsets.copy()
-    axis = rotation / angle
-    parallel = np.outer(along(offsets, axis), axis)
-    return np.asarray(parallel + math.cos(angle) * (offsets - parallel) + math.sin(angle) * np.cross(axis, offsets))
 
 
 def matrices(quaternions: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Vectors in compiled code, of one body, or with `simd.py` of several side by side; and small systems of equations.
+"""Vectors in compiled code, of one body, or with `lanes.py` of several side by side; and small systems of equations.
 
 The latter are solved by elimination without pivots: for matrices that are all but positive definite. The routines of
 NumPy do the same through BLAS, which has other digits on other processors.

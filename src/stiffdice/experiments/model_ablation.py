@@ -12,14 +12,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.inertia import rotate
 from stiffdice.dynamics.models import registry as models
-from stiffdice.dynamics.models import sliding, tumbling
+from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Array, Physics, States, physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity, result
@@ -212,12 +213,6 @@ def _starts(scene: Scene, model: str, steps: int) -> list[Callable[[], Callable[
     return [engines.ready(TIMED_SCHEME, scene, model, steps, 1), lambda: partial(plain, every=steps), lambda: plain]
 
 
-class _Rows(NamedTuple):
-    """Vectors that `tumbling.rotate` turns, shape (3, 3)."""
-
-    node_offset: Array
-
-
 @njit(cache=True)
 def take_with_tensor(model: Any, physics: Physics, states: States, tensor: Array, h: float, steps: int) -> None:
     """Take so many steps of symplectic Euler of a body whose tensor of inertia turns with it: I ← R I Rᵀ."""
@@ -231,9 +226,9 @@ def take_with_tensor(model: Any, physics: Physics, states: States, tensor: Array
         rate = math.sqrt(wx * wx + wy * wy + wz * wz)
         if rate > 0.0:
             ax, ay, az, angle = wx / rate, wy / rate, wz / rate, rate * h
-            tumbling.rotate(state, ax, ay, az, angle)
-            tumbling.rotate(_Rows(tensor), ax, ay, az, angle)
-            tumbling.rotate(_Rows(tensor.T), ax, ay, az, angle)
+            rotate(state.node_offset, ax, ay, az, angle)
+            rotate(tensor, ax, ay, az, angle)
+            rotate(tensor.T, ax, ay, az, angle)
 
 
 @njit

@@ -17,13 +17,14 @@ import xarray as xr
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import STATE, Array, physics_of, rotated
+from stiffdice.dynamics.state import STATE, Array, physics_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected, coordinates, mapped, numbers, result
 from stiffdice.experiments.placement import level
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import INERTIAS
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import Launch, Scene
 from stiffdice.simulation.engines import registry as engines
 

@@ -19,21 +19,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiffdice.dynamics.compilation import by_tag, njit
+from stiffdice.dynamics.compilation import by_tag, njit, where
 from stiffdice.dynamics.contact import push
+from stiffdice.dynamics.inertia import (
+    AnyAngle,
+    Box,
+    Isotropic,
+    SmallAngle,
+    combined,
+    freely_turned,
+    small_rotation,
+    spin_about,
+)
 from stiffdice.dynamics.models.sliding import Sliding
 from stiffdice.dynamics.models.tumbling import Tumbling
 from stiffdice.dynamics.models.vertical import Vertical
-from stiffdice.dynamics.simd import where
-from stiffdice.dynamics.state import TURNING, Array, Physics, States, along
+from stiffdice.dynamics.state import TURNING, Array, Physics, States
 from stiffdice.dynamics.vector import Vector, cross, dot, inlined, minus, norm, plus, plus_times, times
-from stiffdice.integrators.member_block import EDGES, ROWS, SPIN, Body, member, put
+from stiffdice.integrators.member_block import EDGES, MOMENTUM, ROWS, SPIN, Body, member, put
 from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.rotation import along
 from stiffdice.scene.scene import Scene
 
 
 class Numbers(NamedTuple):
-    """What a step needs to know, SI units; onset: of the law; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h g."""
+    """What a step needs to know, SI units.
+
+    onset: of the law; slip: −mu; per_mass: h/m; per_inertia: 1/I; gain: h g.
+
+    body: of `inertia.py`.
+    """
 
     h: float
     stiffness: float
@@ -44,6 +59,38 @@ class Numbers(NamedTuple):
     per_mass: float
     per_inertia: float
     gain: Vector
+    body: Any
+
+
+@inlined
+def _centre(k: Numbers, body: Body) -> Vector:
+    """Return the centre of a box from its centre of mass [m]."""
+    return combined(k.body.centre, body.a, body.b, body.c)
+
+
+# Of the centre of a box, whose half-edges lead to its nodes: (body of `inertia.py`, k, body) -> its height [m], its
+# velocity [m/s]; and the torque about the centre of mass of a force with a torque about that of the box.
+height_of = by_tag(
+    {
+        Isotropic: inlined(lambda k, body: body.place.z),
+        Box: inlined(lambda k, body: body.place.z + _centre(k, body).z),
+    },
+    inlined=True,
+)
+_velocity_of = by_tag(
+    {
+        Isotropic: inlined(lambda k, body: body.velocity),
+        Box: inlined(lambda k, body: plus(body.velocity, cross(body.spin, _centre(k, body)))),
+    },
+    inlined=True,
+)
+_about_mass = by_tag(
+    {
+        Isotropic: inlined(lambda k, body, force, torque: torque),
+        Box: inlined(lambda k, body, force, torque: plus(torque, cross(_centre(k, body), force))),
+    },
+    inlined=True,
+)
 
 
 # How cubes that do not turn stand: on a face, so that two of their half-edges are level, or otherwise.
@@ -54,7 +101,7 @@ Tilted = namedtuple("Tilted", ())
 @inlined
 def _flat_push(k: Numbers, body: Body) -> Any:
     half = max(abs(body.a.z), abs(body.b.z))
-    half, height = max(half, abs(body.c.z)), body.place.z
+    half, height = max(half, abs(body.c.z)), height_of(k.body, k, body)
     stiffness, drag = 4.0 * k.stiffness, (4.0 * k.damping) * body.velocity.z  # of the four nodes of a face
     return push(k.onset, half - height, drag, stiffness) + push(k.onset, -half - height, drag, stiffness)
 
@@ -71,7 +118,8 @@ def _face_push(k: Numbers, height: Any, drag: Any, b: Any, c: Any) -> Any:
 
 @inlined
 def _tilted_push(k: Numbers, body: Body) -> Any:
-    height, drag, a, b, c = body.place.z, k.damping * body.velocity.z, body.a.z, body.b.z, body.c.z
+    height, drag = height_of(k.body, k, body), k.damping * body.velocity.z
+    a, b, c = body.a.z, body.b.z, body.c.z
     return _face_push(k, height + a, drag, b, c) + _face_push(k, height - a, drag, b, c)
 
 
@@ -138,26 +186,13 @@ def _four(
 def _forces(k: Numbers, body: Body) -> tuple[Vector, Vector]:
     """Return the force on all nodes [N], without their weight, and its torque [N m]: Σ r × f = a × Σ ±f + …"""
     by_a, by_b, by_c = cross(body.spin, body.a), cross(body.spin, body.b), cross(body.spin, body.c)
-    height, u = body.place.z, body.velocity
+    height, u = height_of(k.body, k, body), _velocity_of(k.body, k, body)
     here, here_b, here_c = _four(k, height + body.a.z, plus(u, by_a), body.b.z, by_b, body.c.z, by_c)
     there, there_b, there_c = _four(k, height - body.a.z, minus(u, by_a), body.b.z, by_b, body.c.z, by_c)
     about_b, about_c = cross(body.b, plus(here_b, there_b)), cross(body.c, plus(here_c, there_c))
-    return plus(here, there), plus(cross(body.a, minus(here, there)), plus(about_b, about_c))
-
-
-# sin(θ)/θ and (1 − cos(θ))/θ² in powers of θ²: what is left out is below round-off up to 1 rad.
-_S = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(9))
-_V = tuple((-1.0) ** k / math.factorial(2 * k + 2) for k in range(9))
-_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8 = _S
-_V0, _V1, _V2, _V3, _V4, _V5, _V6, _V7, _V8 = _V
-
-
-@inlined
-def _rotation(q: Any) -> tuple[Any, Any]:
-    """Return sin(θ)/θ and (1 − cos(θ))/θ² for θ² = q."""
-    sine = _S0 + q * (_S1 + q * (_S2 + q * (_S3 + q * (_S4 + q * (_S5 + q * (_S6 + q * (_S7 + q * _S8)))))))
-    versine = _V0 + q * (_V1 + q * (_V2 + q * (_V3 + q * (_V4 + q * (_V5 + q * (_V6 + q * (_V7 + q * _V8)))))))
-    return sine, versine
+    force = plus(here, there)
+    torque = plus(cross(body.a, minus(here, there)), plus(about_b, about_c))
+    return force, _about_mass(k.body, k, body, force, torque)
 
 
 @inlined
@@ -189,12 +224,30 @@ def _tumble(posture: Any, k: Numbers, body: Body) -> Body:
     force, torque = _forces(k, body)
     velocity = _kicked(k, body.velocity, force)
     momentum = plus_times(body.momentum, k.h, torque)
+    return _spun(k.body, k, body, velocity, momentum)
+
+
+@inlined
+def _spun_steadily(k: Numbers, body: Body, velocity: Vector, momentum: Vector) -> Body:
     spin = times(k.per_inertia, momentum)
     angle = times(k.h, spin)
-    sine, versine = _rotation(dot(angle, angle))
+    sine, versine = small_rotation(dot(angle, angle))
     beyond = _beyond(angle)
     edges = _turned(body, angle, where(beyond, 0.0, sine), where(beyond, 0.0, versine))
     return Body(plus_times(body.place, k.h, velocity), velocity, momentum, spin, *edges)
+
+
+@inlined
+def _spun_freely(k: Numbers, body: Body, velocity: Vector, momentum: Vector) -> Body:
+    angle = times(k.h, spin_about(k.body, momentum, body.a, body.b, body.c))
+    h = where(_beyond(angle), 0.0, k.h)
+    edges = freely_turned(SmallAngle(), k.body, momentum, h, body.a, body.b, body.c)
+    spin = spin_about(k.body, momentum, *edges)
+    return Body(plus_times(body.place, k.h, velocity), velocity, momentum, spin, *edges)
+
+
+# (body of `inertia.py`, k, body, velocity, momentum) -> the state with these, moved and turned for a step.
+_spun = by_tag({Isotropic: _spun_steadily, Box: _spun_freely}, inlined=True)
 
 
 # (model, posture, k, body) -> the state one step later, but for the turn of members that are `unturned`.
@@ -208,17 +261,45 @@ def unturned(k: Numbers, body: Body) -> Any:
 
 
 @njit
-def turn(block: Array, lane: int, h: float) -> None:
-    """Turn one member by what it turns in a step of h [s], if the step has not."""
-    angle = times(h, member(block, SPIN, lane))
-    if not _beyond(angle):
-        return
+def turn(k: Numbers, block: Array, lane: int) -> None:
+    """Turn one member by what it turns in a step, if the step has not."""
+    angle = times(k.h, member(block, SPIN, lane))
+    if _beyond(angle):
+        _turn_far(k.body, k, block, lane, angle)
+
+
+@njit
+def _turn_steadily(k: Numbers, block: Array, lane: int, angle: Vector) -> None:
     size = norm(angle)
     sine, versine = math.sin(size) / size, (1.0 - math.cos(size)) / (size * size)
     for edge in range(EDGES, ROWS, 3):
         now = member(block, edge, lane)
         across = cross(angle, now)
         put(block, edge, lane, plus_times(plus_times(now, sine, across), versine, cross(angle, across)))
+
+
+@njit
+def _turn_freely(k: Numbers, block: Array, lane: int, angle: Vector) -> None:
+    a, b, c = member(block, EDGES, lane), member(block, EDGES + 3, lane), member(block, EDGES + 6, lane)
+    momentum = member(block, MOMENTUM, lane)
+    a, b, c = freely_turned(AnyAngle(), k.body, momentum, k.h, a, b, c)
+    put(block, EDGES, lane, a)
+    put(block, EDGES + 3, lane, b)
+    put(block, EDGES + 6, lane, c)
+    put(block, SPIN, lane, spin_about(k.body, momentum, a, b, c))
+
+
+# (body of `inertia.py`, k, block, lane, angle): turn a member that turns by more than a radian.
+_turn_far = by_tag({Isotropic: _turn_steadily, Box: _turn_freely})
+
+# (body of `inertia.py`, k, body) -> the energy of rotation [J].
+turning_energy = by_tag(
+    {
+        Isotropic: inlined(lambda k, body: (0.5 * k.per_inertia) * dot(body.momentum, body.momentum)),
+        Box: inlined(lambda k, body: 0.5 * dot(body.momentum, body.spin)),
+    },
+    inlined=True,
+)
 
 
 def numbers_of(physics: Physics, axes: Array, h: float) -> Numbers:
@@ -228,12 +309,13 @@ def numbers_of(physics: Physics, axes: Array, h: float) -> Numbers:
         gain = Vector(*(-h * physics.gravity * axes[:, 2]).tolist())
         per_mass, per_inertia = float(h / mass), float(1.0 / inertia)
     slip, cutoff = -physics.friction, physics.cutoff
-    return Numbers(h, physics.stiffness, physics.damping, physics.onset, slip, cutoff, per_mass, per_inertia, gain)
+    forces = physics.stiffness, physics.damping, physics.onset, slip, cutoff
+    return Numbers(h, *forces, per_mass, per_inertia, gain, physics.body)
 
 
 def posture_of(scene: Scene, model: str, launches: States) -> Any:
     """Return the tag of how the members stand: flat if none turns and all are on a face, to round-off."""
     edges = np.einsum("ke,mkx->mex", SIGNS, launches["node_offset"]) / len(SIGNS)
     levels = np.sort(np.abs(along(edges, scene.ground.normal)), axis=1)
-    flat = (levels[:, :2] <= 4 * np.finfo(float).eps * scene.cube.side).all()
+    flat = (levels[:, :2] <= 8 * np.finfo(float).eps * min(scene.cube.half_sides)).all()
     return Flat() if model not in TURNING and flat else Tilted()

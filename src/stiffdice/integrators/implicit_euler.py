@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from stiffdice.dynamics import contact
+from stiffdice.dynamics import contact, inertia
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Array, Motion, Physics
-from stiffdice.dynamics.vector import Vector, cross, factorise, norm, plus, row, solve, unit, vector
+from stiffdice.dynamics.vector import Vector, cross, dot, factorise, norm, plus, row, solve, unit, vector
 from stiffdice.integrators.free_flight import scaled
 
 ImplicitEuler = namedtuple("ImplicitEuler", ())
@@ -61,9 +61,12 @@ def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -
     if pressing != 0 and physics.friction > 0.0:
         _assemble(physics, state, slips, pressing, True, change, system, h)
         _solve(system, change)
+    first, second, third = inertia.tensor_of(physics.body, physics, state)
+    turning = vector(change[3:])
     models.move(model, state, scaled(change, h))
-    m, i = physics.mass, physics.inertia
-    impulse = m * change[0], m * change[1], m * change[2], i * change[3], i * change[4], i * change[5]
+    m = physics.mass
+    torques = dot(first, turning), dot(second, turning), dot(third, turning)
+    impulse = m * change[0], m * change[1], m * change[2], *torques
     models.kick(model, physics, state, impulse, 1.0)
     return 1
 
@@ -77,8 +80,12 @@ def _assemble(
     rubs: with friction by the normal forces after `change`.
     """
     system.fill(0.0)
-    for k in range(system.shape[0]):
-        system[k, k] = physics.mass if k < 3 else physics.inertia
+    tensor = inertia.tensor_of(physics.body, physics, state)
+    for k in range(3):
+        system[k, k] = physics.mass
+        if system.shape[0] == 6:
+            for j in range(3):
+                system[3 + k, 3 + j] = tensor[k][j]
     pressing = 0
     for k in range(slips.shape[0]):
         arm = row(state.node_offset, k)

@@ -13,6 +13,8 @@ import numpy as np
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import TOUCHING, TURNING, Array
+from stiffdice.scene import die
+from stiffdice.scene.cube import SIGNS, Cube
 from stiffdice.scene.scene import Scene
 
 # Limits are looked for up to this ωh, in so many parts of it; all of explicit schemes are below three.
@@ -35,7 +37,8 @@ def hardest(scene: Scene, model: str) -> Hardest:
     """Return the fastest contact mode of a cube on a face, which no edge or corner exceeds.
 
     It is the bounce, ω² = 4S/m, for a model that does not turn the cube; rocking, 6S/m for a `solid` cube, where that
-    is faster. ζ = (D/S) ω/2, as dashpots stand beside the springs. All zero where nothing touches.
+    is faster; of a box, on its worst face. ζ = (D/S) ω/2, as dashpots stand beside the springs. All zero where nothing
+    touches.
     """
     stiffness, damping = scene.ground.stiffness, scene.ground.damping
     if model not in TOUCHING or stiffness == 0:
@@ -51,11 +54,21 @@ def _nodes_of_mode(scene: Scene, model: str, *, falling: bool) -> float:
     nodes = 2 * linear_theory.BOUNCE_NODES if falling else linear_theory.BOUNCE_NODES
     if model not in TURNING:
         return nodes
-    offsets = scene.cube.node_offsets()
-    upright = scene.with_ground(normal=(0.0, 0.0, 1.0), stiffness=1.0)
-    modes = linear_theory.contact_modes(upright, offsets, np.ones(len(offsets), bool) if falling else offsets[:, 2] < 0)
-    turning = float(modes[-1]) * scene.cube.mass
+    turning = max(_fastest_on(scene, axis, falling) for axis in _faces(scene.cube)) * scene.cube.mass
     return turning if turning > nodes * (1 + _ROUND_OFF) else nodes
+
+
+def _faces(cube: Cube) -> Array:
+    """Return the outward normals of the faces that differ in how a body stands on them, shape (face, 3)."""
+    return die.NORMALS if cube.is_box else die.NORMALS[:1]
+
+
+def _fastest_on(scene: Scene, normal: Array, falling: bool) -> float:
+    """Return the largest ω² [1/s²] at S = 1 kg/s² on a face's four nodes, or damped at all eight."""
+    offsets = scene.cube.node_offsets()
+    standing = scene.with_ground(normal=tuple(-normal), stiffness=1.0)
+    touching = np.ones(len(offsets), bool) if falling else SIGNS @ normal > 0
+    return float(linear_theory.contact_modes(standing, offsets, touching)[-1])
 
 
 @lru_cache(maxsize=64)  # the cells of a column share them
@@ -84,7 +97,7 @@ def half_turn_steps(scene: Scene, momentum: Array) -> Array:
     momentum: angular momenta [kg m²/s], shape (..., 3).
     """
     with np.errstate(all="ignore"):
-        rate = np.hypot(np.hypot(momentum[..., 0], momentum[..., 1]), momentum[..., 2]) / scene.cube.moment_of_inertia
+        rate = np.hypot(np.hypot(momentum[..., 0], momentum[..., 1]), momentum[..., 2]) / scene.cube.least_moment
         return np.asarray(scene.duration * rate / math.pi)
 
 

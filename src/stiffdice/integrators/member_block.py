@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiffdice.dynamics.compilation import by_tag, njit
+from stiffdice.dynamics.compilation import by_tag, load, njit, store
+from stiffdice.dynamics.inertia import centre_of, half_edge, put_nodes
 from stiffdice.dynamics.models.registry import turns
-from stiffdice.dynamics.simd import load, store
 from stiffdice.dynamics.state import Array
-from stiffdice.dynamics.vector import Vector, dot, inlined, plus_times, row, times, vector
-from stiffdice.scene.cube import SIGNS
+from stiffdice.dynamics.vector import Vector, dot, inlined, row, vector
 from stiffdice.scene.scene import Scene
 
 
@@ -114,10 +113,7 @@ def enter(axes: Array, state: Any, block: Array, lane: int) -> None:
     put(block, MOMENTUM, lane, _seen_along(axes, vector(state.angular_momentum)))
     put(block, SPIN, lane, _seen_along(axes, vector(state.angular_velocity)))
     for edge in range(3):
-        total = Vector(0.0, 0.0, 0.0)
-        for k in range(len(SIGNS)):
-            total = plus_times(total, SIGNS[k, edge], row(state.node_offset, k))
-        put(block, EDGES + 3 * edge, lane, _seen_along(axes, times(1 / 8, total)))
+        put(block, EDGES + 3 * edge, lane, _seen_along(axes, half_edge(state.node_offset, edge)))
 
 
 @njit
@@ -127,12 +123,12 @@ def place_of(axes: Array, block: Array, lane: int) -> Vector:
 
 
 @njit
-def leave(model: Any, axes: Array, block: Array, lane: int, state: Any) -> None:
-    """Put what a step changes of a member into its STATE record."""
+def leave(system: Any, axes: Array, block: Array, lane: int, state: Any) -> None:
+    """Put what a step changes of a member into its STATE record; system: model and physics."""
     world, position, velocity = axes.T, state.position, state.velocity
     position[0], position[1], position[2] = place_of(axes, block, lane)
     velocity[0], velocity[1], velocity[2] = _seen_along(world, member(block, VELOCITY, lane))
-    if not turns(model):
+    if not turns(system.model):
         return
     momentum, spin = state.angular_momentum, state.angular_velocity
     momentum[0], momentum[1], momentum[2] = _seen_along(world, member(block, MOMENTUM, lane))
@@ -140,9 +136,7 @@ def leave(model: Any, axes: Array, block: Array, lane: int, state: Any) -> None:
     a = _seen_along(world, member(block, EDGES, lane))
     b = _seen_along(world, member(block, EDGES + 3, lane))
     c = _seen_along(world, member(block, EDGES + 6, lane))
-    for k in range(len(SIGNS)):
-        node = plus_times(plus_times(times(SIGNS[k, 0], a), SIGNS[k, 1], b), SIGNS[k, 2], c)
-        state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = node
+    put_nodes(state.node_offset, centre_of(system.physics.body, system.physics, a, b, c), a, b, c)
 
 
 def axes_of(scene: Scene) -> Array:

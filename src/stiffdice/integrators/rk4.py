@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
+from stiffdice.dynamics.inertia import spin_of
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import STATE, Motion, Physics
 from stiffdice.dynamics.vector import Vector, assign, cross, times, vector
@@ -68,8 +69,7 @@ def _slope(model: Any, physics: Physics, state: Any, taken: Motion, h: float) ->
     ux, uy, uz = vector(state.velocity)
     wx = wy = wz = 0.0
     if models.turns(model):
-        lx, ly, lz = vector(state.angular_momentum)
-        wx, wy, wz = lx / physics.inertia, ly / physics.inertia, lz / physics.inertia
+        wx, wy, wz = spin_of(physics.body, physics, state, vector(state.angular_momentum))
     turned = times(h, vector(taken[3:]))
     a = cross(turned, Vector(wx, wy, wz))
     b = cross(turned, a)

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import TOUCHING, TURNING, along, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, start_of
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
+from stiffdice.scene.rotation import along
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS
 from stiffdice.simulation.criteria.registry import CRITERIA

@@ -6,14 +6,18 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from stiffdice.errors import InputError
 from stiffdice.scene import flat_landing, units, validation
 from stiffdice.scene.cube import GEOMETRIES, Cube, radius_of
 from stiffdice.scene.flat_landing import CONTACT_LAWS
+from stiffdice.scene.mass_distribution import checked_node_masses, checked_sides
+from stiffdice.scene.rotation import rotated
 
 # By section: a key that may be given, and the key it is given instead of.
 INSTEAD: Mapping[str, Mapping[str, str]] = {
-    "cube": {"side": "radius"},
+    "cube": {"side": "radius", "sides": "radius", "node_masses": "mass"},
     "ground": {"restitution": "damping", "contact_time": "stiffness"},
 }
 
@@ -32,15 +36,23 @@ def excluded(section: str, key: str) -> set[str]:
     return {other for pair in pairs.items() if key in pair for other in pair if other != key}
 
 
+# Keys that are stored beside those that follow from them: both may be given, if they agree.
+_STORED = ("sides", "node_masses")
+
+
 def _refuse_both(section: str, keys: Mapping[str, Any]) -> None:
     for key, stored in INSTEAD[section].items():
-        if key in keys and stored in keys:
+        if key in keys and stored in keys and key not in _STORED:
             raise InputError(f"{section}.{key} and {section}.{stored} are both given: allowed is one of them")
 
 
 def cube(keys: Mapping[str, Any]) -> Resolved:
-    """Return the keys of a cube with its radius for its side; raises InputError if it has both."""
+    """Return the keys of a cube with its radius for its side or sides, and its mass; raises InputError for both."""
     _refuse_both("cube", keys)
+    if "sides" in keys and "side" in keys:
+        raise InputError("cube.side and cube.sides are both given: allowed is one of them")
+    if "sides" in keys or "node_masses" in keys:
+        return _box(keys)
     if "side" not in keys:
         return dict(keys), ()
     geometry = validation.choice("cube.geometry", keys.get("geometry", GEOMETRY), GEOMETRIES)
@@ -49,6 +61,28 @@ def cube(keys: Mapping[str, Any]) -> Resolved:
     rest["radius"] = radius_of(side, geometry)
     told = f"cube.radius = {rest['radius']:.6g} m, from cube.side = {side:g} m by the {geometry} geometry"
     return rest, (told,)
+
+
+def _box(keys: Mapping[str, Any]) -> Resolved:
+    """Return the keys of a box with what follows from its sides and from its nodes' masses."""
+    rest, told = dict(keys), []
+    if "sides" in rest:
+        sides = checked_sides(rest["sides"])
+        rest.setdefault("geometry", GEOMETRY)
+        if "radius" not in rest:
+            rest["radius"] = math.hypot(*sides) / 2
+            told.append(f"cube.radius = {rest['radius']:.6g} m, half the diagonal of cube.sides = {list(sides)} m")
+    if "node_masses" in rest:
+        masses = checked_node_masses(rest["node_masses"])
+        rest.setdefault("inertia", "corners")
+        if "mass" not in rest:
+            rest["mass"] = sum(masses)
+            told.append(f"cube.mass = {rest['mass']:.6g} kg, the sum of cube.node_masses")
+    if "side" in rest:
+        rest, of_side = cube({key: value for key, value in rest.items() if key != "node_masses"})
+        rest["node_masses"] = keys["node_masses"]
+        told.extend(of_side)
+    return rest, tuple(told)
 
 
 def ground(keys: Mapping[str, Any], cube: Cube, stiffness: float) -> Resolved:
@@ -92,16 +126,37 @@ def launch(keys: Mapping[str, Any], cube: Cube) -> dict[str, Any]:
         return dict(keys)
     given = validation.listed(keys["angular_momentum"])
     if isinstance(given, Mapping):
-        given = {key: _momentum([value], cube)[0] for key, value in given.items()}
+        given = {key: _momentum_of_each(value, cube) for key, value in given.items()}
     elif isinstance(given, list):
-        given = _momentum(given, cube)
+        given = _momentum(given, cube, keys.get("orientation", (0.0, 0.0, 0.0)))
     return {**keys, "angular_momentum": given}
 
 
-def _momentum(values: list[Any], cube: Cube) -> list[Any]:
-    """Return angular velocities as angular momenta; values of which one that is not zero has another unit as given."""
+def _rates(values: list[Any]) -> list[float] | None:
+    """Return angular velocities [rad/s]; None for values of which one that is not zero has another unit."""
     try:
-        rates = [units.in_si(value, "rad/s") if value != 0 or value is False else 0.0 for value in values]
+        return [units.in_si(value, "rad/s") if value != 0 or value is False else 0.0 for value in values]
     except (TypeError, ValueError):
+        return None
+
+
+def _momentum_of_each(value: Any, cube: Cube) -> Any:
+    """Return a component of an angular velocity as one of angular momentum; any other value as it is."""
+    rates = _rates([value])
+    if rates is None:
+        return value
+    return cube.moment_of_inertia * rates[0] if any(rates) else 0.0
+
+
+def _momentum(values: list[Any], cube: Cube, orientation: object) -> list[Any]:
+    """Return an angular velocity as angular momentum, of a cube turned by a rotation vector; other values as given."""
+    rates = _rates(values)
+    if rates is None:
         return values
-    return [cube.moment_of_inertia * rate for rate in rates]
+    if not any(rates):
+        return rates
+    if cube.distribution.is_isotropic:
+        return [cube.moment_of_inertia * rate for rate in rates]
+    edges = rotated(np.eye(3), np.array(validation.vector("launch.orientation", orientation, "rad")))
+    momentum: list[float] = (edges.T @ (cube.distribution.tensor @ (edges @ rates))).tolist()
+    return momentum

@@ -154,6 +154,8 @@ class Scene:
         # A round trip through JSON turns the tuples into the lists that YAML has.
         mapping: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(self)))
         del mapping["derived"]
+        # Digests of scenes are as they were before cubes had these keys.
+        mapping["cube"] = {key: value for key, value in mapping["cube"].items() if value is not None}
         return mapping
 
     @property

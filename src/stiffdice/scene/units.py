@@ -51,6 +51,7 @@ EXAMPLES = {
     "m/s²": "9.81 m/s^2",
     "kg/s²": "10 kN/m",
     "kg/s": "200 g/s",
+    "kg m²": "10 kg mm^2",
     "kg m²/s": "10 kg mm^2/s",
     "rad/s": "20 rad/s",
 }

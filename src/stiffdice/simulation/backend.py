@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from stiffdice import __version__
 from stiffdice.dynamics import model_selection
+from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
@@ -107,5 +108,10 @@ def check_fit(simulator: str, scheme: str, scene: Scene, model: str) -> None:
     """Raise InputError where a scheme does not apply to a scene and model, or an engine cannot represent them."""
     if simulator == OURS:
         schemes.check_fit(scheme, scene, model)
-    else:
-        driver().check_fit(simulator, scene, model)
+        return
+    if not scene.cube.distribution.is_isotropic:
+        raise InputError(
+            f"simulator = {simulator}: takes a cube with the same moment of inertia about every axis through its "
+            f"centre; allowed for another box is {OURS}"
+        )
+    driver().check_fit(simulator, scene, model)

@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.compilation import bits, njit, store, where
 from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
-from stiffdice.dynamics.simd import bits, store, where
 from stiffdice.dynamics.state import TOUCHING, Array, States
 from stiffdice.dynamics.vector import Vector, dot, inlined
 from stiffdice.integrators import batched_kernel, member_block
@@ -59,7 +58,7 @@ _ENERGY, _TRAJECTORY = list(CRITERIA).index("energy"), list(CRITERIA).index("tra
 class Common(NamedTuple):
     """What is the same of all members; scheme, width and posture are tags.
 
-    Energy, flights and rest are told by m/2, 1/(2I), and along the ground's axes the weight [N]. lagging [kg m/s] and
+    Energy, flights and rest are told by m/2, and along the ground's axes the weight [N]. lagging [kg m/s] and
     offset [J]: what the kinetic energy lacks as the velocity lags behind the place. omega [1/s]: of a bounce on four
     nodes; sag [m]: as in `monitor.py`.
     """
@@ -71,7 +70,6 @@ class Common(NamedTuple):
     k: Numbers
     limits: Limits
     half_mass: float
-    half_per_inertia: float
     weight: Vector
     lagging: Vector
     offset: float
@@ -99,9 +97,9 @@ def _run_on(common: Common, block: Array) -> int:
     rest, live = row_of(width, block, REST), row_of(width, block, LIVE) > 0.0
     while True:
         new = batched_kernel.step(common.system.model, common.posture, common.k, body)
-        now = new.place.z - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
+        now = batched_kernel.height_of(common.k.body, common.k, new) - (abs(new.a.z) + abs(new.b.z) + abs(new.c.z))
         # Kinetic energy + m g z, the velocity at the time of the place.
-        turning = common.half_per_inertia * dot(new.momentum, new.momentum)
+        turning = batched_kernel.turning_energy(common.k.body, common.k, new)
         moving = common.half_mass * dot(new.velocity, new.velocity) + turning
         total = ((moving - dot(common.lagging, new.velocity)) + dot(common.weight, new.place)) + common.offset
         up = now > 0.0
@@ -152,7 +150,7 @@ def _only_compared(common: Common, axes: Array, block: Array, lane: int, member:
 def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Member, samples: States, done: int) -> int:
     """Show the step that a member has just taken in a lane; return after how many steps in all it now is."""
     state, sight, memory, _ = member
-    member_block.leave(common.system.model, axes, block, lane, state)
+    member_block.leave(common.system, axes, block, lane, state)
     sight.speed, sight.height, sight.clearance = block[SPEED, lane], block[HEIGHT, lane], block[BEFORE, lane]
     sight.speed_before = block[EARLIER, lane]
     energy.count(memory.energy, block[WORST, lane])
@@ -229,7 +227,7 @@ def _march(
             m, most, moved = inside[lane], 0, False
             if m >= 0:
                 if models.turns(common.system.model):
-                    batched_kernel.turn(block, lane, common.k.h)
+                    batched_kernel.turn(common.k, block, lane)
                 member = Member(ensemble[m], sight[m], memory[m], references[m % len(references)])
                 work += _EVENT
                 if _only_compared(common, axes, block, lane, member, steps_done[m]):
@@ -288,17 +286,16 @@ def march_of(task: Task) -> tuple[Any, tuple[Any, ...]] | None:
     up, behind = axes[:, 2], schemes.LAGS[SCHEME] * h * physics.gravity
     with np.errstate(all="ignore"):
         weight, lagging = physics.mass * physics.gravity * up, physics.mass * behind * up
-        per_inertia = float(np.float64(0.5) / physics.inertia)
         omega = float(np.sqrt(4 * physics.stiffness / np.float64(physics.mass)))
     k, half_mass = batched_kernel.numbers_of(physics, axes, h), 0.5 * physics.mass
     offset = half_mass * behind * behind
-    numbers = [*k._replace(onset=0.0)[:-1], *k.gain, half_mass, per_inertia, *weight, *lagging, offset, omega, sag]
+    numbers = [*k._replace(onset=0.0)[:-2], *k.gain, half_mass, *weight, *lagging, offset, omega, sag]
     if not np.isfinite(numbers).all():
         return None
     width = Alone() if len(members.ensemble) < FEWEST else member_block.ABREAST[model]
     posture = batched_kernel.posture_of(scene, model, members.ensemble)
     along = Vector(*weight.tolist()), Vector(*lagging.tolist())
-    energies = half_mass, per_inertia, *along, offset, omega, float(sag)
+    energies = half_mass, *along, offset, omega, float(sag)
     common = Common(schemes.SCHEMES[SCHEME], width, posture, system, k, task.limits, *energies)
     lanes = member_block.WIDTHS[type(width)]
     block, inside = np.zeros((ROWS, lanes)), np.full(lanes, -1)

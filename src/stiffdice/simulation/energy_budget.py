@@ -36,6 +36,7 @@ from stiffdice.dynamics.contact import (
     reaches,
     upward,
 )
+from stiffdice.dynamics.inertia import spin_of
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, Array, Physics, States, physics_of, start_of
 from stiffdice.dynamics.vector import Vector, cross, plus, plus_times, row, times, vector
@@ -183,9 +184,9 @@ def _look(physics: Physics, states: States, late: float, views: npt.NDArray[np.v
     """View states whose velocity is `late` [s]; physics: without the nodes' weight, so that forces are the ground's."""
     for k in range(len(states)):
         state, view = states[k], views[k]
+        spin = spin_of(physics.body, physics, state, vector(state.angular_momentum))
         for axis in range(3):
-            view.motion[axis] = state.velocity[axis]
-            view.motion[3 + axis] = state.angular_momentum[axis] / physics.inertia
+            view.motion[axis], view.motion[3 + axis] = state.velocity[axis], spin[axis]
         fall = physics.gravity * late
         view.kinetic = energy.kinetic(physics, state)
         view.potential = energy.potential(physics, state)

@@ -17,6 +17,7 @@ from typing import Any
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags, height_of, lowest_of, normal_of, reaches, speed_of, swing_square
+from stiffdice.dynamics.inertia import spins_steadily
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.dynamics.vector import Vector, cross, dot, row, vector
@@ -66,9 +67,11 @@ def fly(scheme: Any, system: System, member: Member, most: int) -> int:
     any number of steps it is lowest at an end.
     """
     state, sight = member.state, member.sight
+    h, model, physics = sight.step_size, system.model, system.physics
     if sight.flight < 2.0 or most < WORTHWHILE or lost(sight):
         return 0
-    h, model, physics = sight.step_size, system.model, system.physics
+    if models.turns(model) and not spins_steadily(physics.body):
+        return 0
     # A scheme's path may be off the parabola by a step's move or two.
     margin = 4 * h * (abs(sight.speed) + h * abs(sight.pull))
     room = sight.height - models.extent(model, physics, state) - margin

@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from stiffdice.dynamics.state import TOUCHING, TURNING, Ensemble, States, along, rotated, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Ensemble, States, spin_of, start_of
 from stiffdice.errors import InputError
+from stiffdice.scene.rotation import along, rotated
 from stiffdice.scene.scene import Scene
 
 
@@ -44,7 +45,7 @@ def turned(scene: Scene, model: str, count: int) -> States:
         axis = np.array([across * math.cos(2 * math.pi * q), across * math.sin(2 * math.pi * q), 2 * p - 1])
         member["angular_momentum"] = spin * axis
         if scene.launch.node_velocity == "rigid":
-            member["angular_velocity"] = member["angular_momentum"] / scene.cube.moment_of_inertia
+            member["angular_velocity"] = spin_of(scene.cube, member)
     return members
 
 
@@ -65,10 +66,12 @@ def phased(
     down = np.array([0.0, 0.0, -scene.gravity])
     members["position"] += members["velocity"] * late[:, None] + 0.5 * down * late[:, None] ** 2
     members["velocity"] += down * late[:, None]
-    spins = members["angular_momentum"] / scene.cube.moment_of_inertia
-    for member, spin, delay in zip(members, spins, late, strict=True):
-        if spin.any():
-            member["node_offset"] = rotated(member["node_offset"], spin * delay)
+    for member, delay in zip(members, late, strict=True):
+        turn = spin_of(scene.cube, member) * delay
+        if turn.any():
+            half = rotated(member["node_offset"], turn / 2)  # where the spin of a box is about the mean of the delay's
+            turn = spin_of(scene.cube, member, half) * delay
+            member["node_offset"] = rotated(member["node_offset"], turn)
     heights = along(members["position"][:, None, :] + members["node_offset"], scene.ground.normal)
     if not heights.min() > 0:
         raise InputError(

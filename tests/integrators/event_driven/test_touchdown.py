@@ -9,8 +9,9 @@ import pytest
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import physics_of, rotated, start_of
+from stiffdice.dynamics.state import physics_of, start_of
 from stiffdice.integrators.event_driven.touchdown import free_time
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import from_mapping
 
 RANDOM = np.random.default_rng(4)

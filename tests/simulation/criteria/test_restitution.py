@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stiffdice.dynamics.state import rotated
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 

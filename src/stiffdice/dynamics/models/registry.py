@@ -10,6 +10,7 @@ from typing import Any
 
 from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.contact import Wrench, height_of, lowest_of, reaches
+from stiffdice.dynamics.inertia import rotate
 from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
 from stiffdice.dynamics.state import TOUCHING, TURNING, Physics
 from stiffdice.dynamics.vector import norm, vector
@@ -54,7 +55,7 @@ def move(model: Any, state: Any, shift: Any) -> None:
         state.position[axis] += shift[axis]
     angle = norm(vector(shift[3:]))
     if turns(model) and angle > 0.0:
-        tumbling.rotate(state, shift[3] / angle, shift[4] / angle, shift[5] / angle, angle)
+        rotate(state.node_offset, shift[3] / angle, shift[4] / angle, shift[5] / angle, angle)
 
 
 @njit

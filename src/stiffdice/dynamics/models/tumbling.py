@@ -1,20 +1,21 @@
-"""`tumbling`: translation and rotation of a rigid cube, the paper's real_throw_cube.m.
+"""`tumbling`: translation and rotation of a rigid cube, the paper's real_throw_cube.m, or of another box.
 
 A cube's inertia is the same about every axis, so that the spin is L/I however the cube is turned: no tensor turns with
-it (paper, section 2.1).
+it (paper, section 2.1). That of another box does (`inertia.py`).
 """
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from typing import Any
 
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics import inertia
+from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.contact import Wrench, node_force, node_velocity, upward
+from stiffdice.dynamics.inertia import Box, Isotropic
 from stiffdice.dynamics.models import sliding
 from stiffdice.dynamics.state import Physics
-from stiffdice.dynamics.vector import Vector, cross, norm, plus, row, vector
+from stiffdice.dynamics.vector import Vector, cross, plus, row, vector
 
 Tumbling = namedtuple("Tumbling", ())
 TAG = Tumbling()
@@ -28,7 +29,21 @@ def force(physics: Physics, state: Any) -> Wrench:
         arm = row(state.node_offset, k)
         on_node = node_force(physics, -upward(physics, plus(place, arm)), node_velocity(state, k))
         total, torque = plus(total, on_node), plus(torque, cross(arm, on_node))
+    torque = plus(torque, _of_weight(physics.body, physics, state))
     return total.x, total.y, total.z, torque.x, torque.y, torque.z
+
+
+@njit
+def _of_weight_of_box(physics: Physics, state: Any) -> Vector:
+    lever = Vector(0.0, 0.0, 0.0)
+    for k in range(len(state.node_offset)):
+        lever = plus(lever, row(state.node_offset, k))
+    return cross(lever, Vector(0.0, 0.0, physics.node_weight))
+
+
+# (body, physics, state) -> the torque [N m] that takes back that of the nodes' weights: all of it acts at the centre of
+# mass. That of a cube's is none.
+_of_weight = by_tag({Isotropic: constant(Vector(0.0, 0.0, 0.0)), Box: _of_weight_of_box})
 
 
 @njit
@@ -51,29 +66,11 @@ def drift(physics: Physics, state: Any, h: float) -> None:
 def turn(physics: Physics, state: Any, duration: float) -> None:
     """Turn the nodes for so long [s] at the spin that the angular momentum says (equation 9)."""
     _spin(physics, state)
-    spin = vector(state.angular_velocity)
-    rate = norm(spin)
-    if rate > 0.0:
-        rotate(state, spin.x / rate, spin.y / rate, spin.z / rate, rate * duration)
+    inertia.turn(physics.body, physics, state, duration)
 
 
 @njit
 def _spin(physics: Physics, state: Any) -> None:
     """Let the nodes move with the spin that the angular momentum says."""
-    for axis in range(3):
-        state.angular_velocity[axis] = state.angular_momentum[axis] / physics.inertia
-
-
-@njit
-def rotate(state: Any, ax: float, ay: float, az: float, angle: float) -> None:
-    """Turn the nodes about a unit axis: R = P + cos(angle)·(E − P) + sin(angle)·A, after equation 9."""
-    c, s = math.cos(angle), math.sin(angle)
-    rxx, rxy, rxz = ax * ax + c * (1 - ax * ax), ax * ay - c * (ax * ay) - s * az, ax * az - c * (ax * az) + s * ay
-    ryx, ryy, ryz = ay * ax - c * (ay * ax) + s * az, ay * ay + c * (1 - ay * ay), ay * az - c * (ay * az) - s * ax
-    rzx, rzy, rzz = az * ax - c * (az * ax) - s * ay, az * ay - c * (az * ay) + s * ax, az * az + c * (1 - az * az)
-    nodes = state.node_offset
-    for k in range(nodes.shape[0]):
-        x, y, z = nodes[k, 0], nodes[k, 1], nodes[k, 2]
-        nodes[k, 0] = rxx * x + rxy * y + rxz * z
-        nodes[k, 1] = ryx * x + ryy * y + ryz * z
-        nodes[k, 2] = rzx * x + rzy * y + rzz * z
+    spin = state.angular_velocity
+    spin[0], spin[1], spin[2] = inertia.spin_of(physics.body, physics, state, vector(state.angular_momentum))

@@ -12,10 +12,11 @@ import numpy as np
 
 from stiffdice.dynamics import flat_bounce
 from stiffdice.dynamics.energy import energies
-from stiffdice.dynamics.state import States, physics_of, rotated, start_of
+from stiffdice.dynamics.state import States, physics_of, start_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.measuring import bisected
 from stiffdice.experiments.placement import level, relaunched, upright
+from stiffdice.scene.rotation import rotated
 from stiffdice.scene.scene import Scene
 
 # Few, so that keeping them costs next to nothing; between two of them there is a flight after the first landing.

@@ -14,10 +14,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics import inertia
+from stiffdice.dynamics.compilation import by_tag, constant, njit
 from stiffdice.dynamics.contact import normal_of, split, upward
+from stiffdice.dynamics.inertia import Box, Isotropic
 from stiffdice.dynamics.state import Physics
-from stiffdice.dynamics.vector import Vector, assign, cross, dot, norm, plus, plus_times, row, times
+from stiffdice.dynamics.vector import Vector, assign, cross, dot, minus, norm, plus, plus_times, row, times
 
 # Parts of a motion, 13, and as many more as make it whole vectors of the processor.
 SIZE = 16
@@ -34,14 +36,17 @@ _ULPS = 8 * 2.0**-52
 
 
 class Contact(NamedTuple):
-    """turning: whether the body turns; dragging: whether the ground damps nodes above it.
+    """turning: whether the body turns; dragging: whether the ground damps nodes above it; flying: whether flights are
+    computed as contacts are, as the spin changes in them.
 
     regime: a record, as arrays would be counted at every call: nodes [m], relative to the centre before they are
-    turned, shape (8, 3); bits, of each node, shape (8,).
+    turned, shape (8, 3); bits, of each node, shape (8,); inverse [1/(kg m²)], of the tensor of inertia then, shape
+    (3, 3), of a box.
     """
 
     turning: bool
     dragging: bool
+    flying: bool
     physics: Physics
     regime: Any
 
@@ -63,12 +68,6 @@ def part_of(motion: Any, first: int) -> Vector:
 
 
 @njit
-def spin_of(physics: Physics, motion: Any) -> Vector:
-    """Return the angular velocity [rad/s] of a motion, or the angular acceleration [rad/s²] of its rate."""
-    return times(1.0 / physics.inertia, part_of(motion, 6))
-
-
-@njit
 def _turned(motion: Any, sense: float, v: Vector) -> Vector:
     """Return a vector turned by the motion's quaternion, or with sense −1 turned back.
 
@@ -84,12 +83,48 @@ def _turned(motion: Any, sense: float, v: Vector) -> Vector:
 
 
 @njit
+def _by_momentum_of_box(contact: Contact, motion: Any, v: Vector) -> Vector:
+    own, inverse = _turned(motion, -1.0, v), contact.regime.inverse
+    return _turned(motion, 1.0, Vector(dot(row(inverse, 0), own), dot(row(inverse, 1), own), dot(row(inverse, 2), own)))
+
+
+# (body of `inertia.py`, contact, motion, momentum) -> the spin [rad/s] that a body turned as in a motion has with an
+# angular momentum; linear in it.
+spin_by = by_tag(
+    {
+        Isotropic: njit(lambda contact, motion, momentum: times(1.0 / contact.physics.inertia, momentum)),
+        Box: _by_momentum_of_box,
+    }
+)
+
+
+@njit
+def spin_of(contact: Contact, motion: Any) -> Vector:
+    """Return the angular velocity [rad/s] of a motion."""
+    return spin_by(contact.physics.body, contact, motion, part_of(motion, 6))
+
+
+@njit
+def _change_by_turn_of_box(contact: Contact, motion: Any, turn: Vector) -> Vector:
+    momentum = part_of(motion, 6)
+    spin = spin_by(contact.physics.body, contact, motion, momentum)
+    return minus(cross(turn, spin), spin_by(contact.physics.body, contact, motion, cross(turn, momentum)))
+
+
+# (body of `inertia.py`, contact, motion, turn) -> by how much the spin changes [rad/s] where a body of the same angular
+# momentum is turned by a small rotation vector [rad], or at which rate [rad/s²] if `turn` is a spin.
+change_by_turn = by_tag(
+    {Isotropic: constant(Vector(0.0, 0.0, 0.0)), Box: _change_by_turn_of_box},
+)
+
+
+@njit
 def node_of(contact: Contact, motion: Any, k: int) -> Node:
     """Return where node k is, and how it moves."""
     arm, velocity = row(contact.regime.nodes, k), part_of(motion, 3)
     if contact.turning:
         arm = _turned(motion, 1.0, arm)
-        velocity = plus(velocity, cross(spin_of(contact.physics, motion), arm))
+        velocity = plus(velocity, cross(spin_of(contact, motion), arm))
     height, n = upward(contact.physics, part_of(motion, 0)), normal_of(contact.physics)
     clearance = height + n.x * arm.x + n.y * arm.y + n.z * arm.z
     return Node(arm, velocity, clearance, *split(contact.physics, velocity))
@@ -120,7 +155,7 @@ def derivative(contact: Contact, motion: Any, rate: Any) -> None:
     rate[5] = (total.z - physics.weight) / physics.mass
     if contact.turning:
         rate[6], rate[7], rate[8] = torque
-        x, y, z = motion[6] / physics.inertia / 2, motion[7] / physics.inertia / 2, motion[8] / physics.inertia / 2
+        x, y, z = times(0.5, spin_of(contact, motion))
         turned = motion[9], motion[10], motion[11], motion[12]
         rate[9], rate[10], rate[11], rate[12] = quaternion_rate(x, y, z, *turned)
 
@@ -148,8 +183,9 @@ def switches(contact: Contact, motion: Any, rate: Any, value: Any, slope: Any) -
     n, none = normal_of(physics), Vector(0.0, 0.0, 0.0)
     level, turn, bend = n, none, none
     if contact.turning:
-        spin = spin_of(physics, motion)
-        bend = plus_times(cross(n, spin_of(physics, rate)), dot(n, spin), spin)
+        spin, body = spin_of(contact, motion), physics.body
+        gained = plus(spin_by(body, contact, motion, part_of(rate, 6)), change_by_turn(body, contact, motion, spin))
+        bend = plus_times(cross(n, gained), dot(n, spin), spin)
         bend = _turned(motion, -1.0, plus_times(bend, -dot(spin, spin), n))
         level, turn = _turned(motion, -1.0, n), _turned(motion, -1.0, cross(n, spin))
     for k in range(NODES):
@@ -231,18 +267,19 @@ def take(turning: bool, state: Any, motion: Any) -> None:
 
 
 @njit
-def give(turning: bool, physics: Any, nodes: Any, motion: Any, state: Any) -> None:
+def give(turning: bool, physics: Physics, nodes: Any, motion: Any, state: Any) -> None:
     """Set a state to a motion's, turning the nodes it began with."""
     for axis in range(3):
         state.position[axis] = motion[axis]
         state.velocity[axis] = motion[3 + axis]
         if turning:
             state.angular_momentum[axis] = motion[6 + axis]
-            state.angular_velocity[axis] = motion[6 + axis] / physics.inertia
     if turning:
         for k in range(NODES):
             x, y, z = _turned(motion, 1.0, row(nodes, k))
             state.node_offset[k, 0], state.node_offset[k, 1], state.node_offset[k, 2] = x, y, z
+        spin = state.angular_velocity
+        spin[0], spin[1], spin[2] = inertia.spin_of(physics.body, physics, state, part_of(motion, 6))
 
 
 @njit

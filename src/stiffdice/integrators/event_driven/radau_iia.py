@@ -26,7 +26,18 @@ from stiffdice.dynamics.contact import normal_of
 from stiffdice.dynamics.state import Physics
 from stiffdice.dynamics.vector import Vector, cross, dot, minus, norm, plus, plus_times, row, times, unit
 from stiffdice.integrators.event_driven import active_set
-from stiffdice.integrators.event_driven.active_set import BELOW, NODES, PUSHED, SIZE, Contact, node_of, push_of, spin_of
+from stiffdice.integrators.event_driven.active_set import (
+    BELOW,
+    NODES,
+    PUSHED,
+    SIZE,
+    Contact,
+    change_by_turn,
+    node_of,
+    push_of,
+    spin_by,
+    spin_of,
+)
 
 STAGES = 5
 ORDER = 7  # of the error estimate
@@ -79,7 +90,7 @@ def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[
         for part in range(6):
             vector.assign(by_speed[stage, part], by_speed[0, part])
             vector.assign(by_place[stage, part], by_place[0, part])
-    _follow(contact, start, h, change, rates, scale)
+    _follow(contact, start, h, change, rates, end, scale)
     correction, last, iteration, fresh, found = 0.0, 0.0, 0, True, False
     # One that wanders off may find other stages, as smooth and as wrong.
     while not found and iteration < _ITERATIONS and (iteration < 3 or correction < last):
@@ -93,7 +104,7 @@ def step(contact: Contact, start: Any, h: float, end: Any, scale: Any) -> tuple[
             _couple(by_speed, by_place, h, unknowns, factors)
             vector.factorise(factors)
         last, correction = correction, _correct(change, rates, h, unknowns, factors, rest, scale)
-        correction = max(correction, _follow(contact, start, h, change, rates, scale))
+        correction = max(correction, _follow(contact, start, h, change, rates, end, scale))
         off = 0.0
         for stage in range(STAGES):
             _reach(start, change[stage], end)
@@ -152,16 +163,19 @@ def _correct(change: Any, rates: Any, h: float, unknowns: int, factors: Any, res
 
 
 @njit
-def _follow(contact: Contact, start: Any, h: float, change: Any, rates: Any, scale: Any) -> float:
-    """Change places and turns as the velocities say; return by how much the turns, over what is tolerated."""
+def _follow(contact: Contact, start: Any, h: float, change: Any, rates: Any, end: Any, scale: Any) -> float:
+    """Change places and turns as the velocities say; return by how much the turns, over what is tolerated.
+
+    end: scratch.
+    """
     for stage in range(STAGES):
         rate, moved = rates[stage], change[stage]
         for axis in range(3):
             rate[axis] = start[3 + axis] + moved[3 + axis]
         if contact.turning:
-            half = 0.5 / contact.physics.inertia
-            x, y, z = half * (start[6] + moved[6]), half * (start[7] + moved[7]), half * (start[8] + moved[8])
-            a, b, c, d = start[9] + moved[9], start[10] + moved[10], start[11] + moved[11], start[12] + moved[12]
+            _reach(start, moved, end)
+            x, y, z = times(0.5, spin_of(contact, end))
+            a, b, c, d = end[9], end[10], end[11], end[12]
             rate[9], rate[10], rate[11], rate[12] = active_set.quaternion_rate(x, y, z, a, b, c, d)
     most = 0.0
     for stage in range(STAGES):
@@ -264,12 +278,13 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
     A node's force f n − μ f p, with f = S d − D u, s the velocity along the ground and p = s/(|s| + ε) by its tangent
     at the slip `about` (shape (8, 3)), changes with the node's velocity v and place x by
     −(n − μ p) (D n·δv + S n·δx) − μ f δp.
-    A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r).
+    A rotation δθ moves the node, and the torque's arm, by δθ × r, and its velocity by ω × (δθ × r); of a box, by the
+    change of its spin, too.
     """
     physics = contact.physics
     by_speed.fill(0.0)
     by_place.fill(0.0)
-    spin, none = spin_of(physics, motion), Vector(0.0, 0.0, 0.0)
+    spin, none = spin_of(contact, motion), Vector(0.0, 0.0, 0.0)
     for k in range(NODES):
         if contact.regime.bits[k] & PUSHED == 0:
             continue
@@ -283,8 +298,10 @@ def slopes(contact: Contact, motion: Any, about: Any, by_speed: Any, by_place: A
             _add(physics, node.arm, _force_change(physics, law, one, none), none, by_speed, axis)
             _add(physics, node.arm, _force_change(physics, law, none, one), none, by_place, axis)
             if contact.turning:
-                moved = times(1.0 / physics.inertia, cross(one, node.arm))
-                change = _force_change(physics, law, cross(spin, moved), moved)
+                turn = spin_by(physics.body, contact, motion, one)
+                moved = cross(turn, node.arm)
+                spun = cross(change_by_turn(physics.body, contact, motion, turn), node.arm)
+                change = _force_change(physics, law, plus(cross(spin, moved), spun), moved)
                 _add(physics, node.arm, _force_change(physics, law, moved, none), none, by_speed, 3 + axis)
                 _add(physics, node.arm, change, cross(moved, times(push, line)), by_place, 3 + axis)
 

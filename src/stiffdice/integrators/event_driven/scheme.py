@@ -18,8 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from stiffdice.dynamics import inertia
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import drags
+from stiffdice.dynamics.inertia import spins_steadily
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
 from stiffdice.dynamics.vector import assign
@@ -59,13 +61,14 @@ _CORRECTIONS = 30
 _NEAR = 1e-3
 
 # What a contact is computed in, one record, which reaches compiled code as a bare pointer (see `state.STATE`). nodes,
-# bits: those of the regime. here, there: the motion at a step's start and end; stages: rates in between. scale: what
-# error is tolerated; nothing: zeros. sums: scratch of the integrator. hard: see `active_set.hardness`. value,
-# slope: of the switches at start and end; small: see `active_set.vanishing`.
+# bits, inverse: those of the regime. here, there: the motion at a step's start and end; stages: rates in between.
+# scale: what error is tolerated; nothing: zeros. sums: scratch of the integrator. hard: see `active_set.hardness`.
+# value, slope: of the switches at start and end; small: see `active_set.vanishing`.
 _WORK = np.dtype(
     [
         ("nodes", np.float64, (NODES, 3)),
         ("bits", np.int8, NODES),
+        ("inverse", np.float64, (3, 3)),
         ("here", np.float64, SIZE),
         ("there", np.float64, SIZE),
         ("scale", np.float64, SIZE),
@@ -88,17 +91,19 @@ def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, m
     """
     # bool() keeps them from being taken for constants, for each of which all would be compiled again.
     turning, dragging = bool(models.turns(model)), bool(physics.damping > 0.0 and drags(physics))
+    flying = turning and not spins_steadily(physics.body)
     left, evaluations, work = h, 0, 0
     while left > 0.0 and work < most:
         if not math.isfinite(state.position[2]):
             return 0.0, evaluations, work
-        if not dragging:
+        if not (dragging or flying):
             free, advances = free_time(model, physics, state, left)
             flight(model, physics, state, free, 1, LAG)
             left -= free
             work += 1 + advances // _ADVANCES
         if left > 0.0:
-            spent, count = _touch(turning, dragging, physics, state, left, tolerance, max(1, most - work))
+            going = turning, dragging, flying
+            spent, count = _touch(going, physics, state, left, tolerance, max(1, most - work))
             left -= spent
             evaluations += count
             work += count
@@ -107,15 +112,16 @@ def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, m
 
 @njit(cache=True)
 def _touch(
-    turning: bool, dragging: bool, physics: Physics, state: Any, most: float, tolerance: float, effort: int
+    going: tuple[bool, bool, bool], physics: Physics, state: Any, most: float, tolerance: float, effort: int
 ) -> tuple[float, int]:
     """Advance `state` until nothing acts on it any more, by at most `most` [s]; return by how much, and evaluations.
 
-    effort: evaluations after which to stop between two steps.
+    going: turning, dragging and flying, of a `Contact`. effort: evaluations after which to stop between two steps.
     """
     # Kept here while it is used: a record does not keep its array alive.
     room = np.zeros(1, _WORK)
-    contact = Contact(turning, dragging, physics, room[0])
+    contact = Contact(*going, physics, room[0])
+    inertia.put_inverse(physics.body, physics, state, room[0].inverse)
     return _go_through(contact, state, most, tolerance, effort, room)
 
 
@@ -132,7 +138,7 @@ def _go_through(
     active_set.begin(contact, work.here, work.small)
     _look(contact, work, work.here, 0, 0)
     time, h, evaluations, idle, forced, growth = 0.0, 0.0, 1, 0, 0, _GROWTH
-    while time < most and evaluations < effort and (contact.dragging or _touches(work)):
+    while time < most and evaluations < effort and (contact.dragging or contact.flying or _touches(work)):
         active_set.hardness(contact, work.here, work.hard)
         if h == 0.0:
             h = _first(contact.physics, work, tolerance)

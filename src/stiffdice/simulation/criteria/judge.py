@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States, along
+from stiffdice.dynamics.state import TOUCHING, TURNING, Physics, States
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
+from stiffdice.scene.rotation import along
 from stiffdice.simulation.criteria.registry import CRITERIA, holds
 from stiffdice.simulation.outcome import BLOW_UP, Verdict, gravest
 from stiffdice.simulation.task import Members, Task

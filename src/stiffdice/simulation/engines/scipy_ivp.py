@@ -32,6 +32,7 @@ from scipy.integrate import ode, odeint, solve_ivp
 
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.inertia import Isotropic
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.models.registry import MODELS
 from stiffdice.dynamics.state import STATE, TURNING, Array, Physics, States, physics_of, start_of
@@ -52,7 +53,7 @@ _NUDGE = 1e-9
 # motion: as in `active_set`, its quaternion made a unit; state: which that stands for.
 _ROOM = np.dtype(
     [
-        ("physics", [(name, np.float64) for name in Physics._fields]),
+        ("physics", [(name, np.float64) for name in Physics._fields[:-1]]),
         ("nodes", np.float64, (NODES, 3)),
         ("motion", np.float64, SIZE),
         ("state", STATE),
@@ -65,6 +66,14 @@ Slopes = Callable[[float, Array, Room, Array], Array]
 
 
 @njit
+def _physics_of(p: Any) -> Physics:
+    """Return the physics of a cube from a record of its numbers."""
+    forces = p.stiffness, p.damping, p.friction, p.onset, p.approach_damping
+    sizes = p.nx, p.ny, p.nz, p.cutoff, p.node_weight, p.weight, p.reach, p.radius, p.side
+    return Physics(p.mass, p.gravity, p.inertia, *forces, *sizes, Isotropic())
+
+
+@njit
 def _put(model: Any, y: Array, room: Any) -> None:
     """Make the state that a solution vector stands for; its quaternion need not be a unit."""
     turning = bool(models.turns(model))
@@ -72,14 +81,14 @@ def _put(model: Any, y: Array, room: Any) -> None:
         room.motion[part] = y[part]
     if turning:
         normalise(room.motion)
-    give(turning, room.physics, room.nodes, room.motion, room.state)
+    give(turning, _physics_of(room.physics), room.nodes, room.motion, room.state)
 
 
 @njit
 def _rate(model: Any, y: Array, room: Any) -> Array:
     """Return dy/dt: velocity and force over mass; for a turning cube torque, and the quaternion's rate."""
     _put(model, y, room)
-    wrench = models.force(model, room.physics, room.state)
+    wrench = models.force(model, _physics_of(room.physics), room.state)
     rate = np.empty(y.shape[0])
     for axis in range(3):
         rate[axis] = y[3 + axis]
@@ -127,7 +136,7 @@ def _states(model: Any, solution: Array, room: Room, states: States) -> None:
 def room_of(scene: Scene, launch: States) -> Room:
     """Return what the equations need to know of a scene and a launch, shape (1,)."""
     room = np.zeros(1, _ROOM)
-    room["physics"], room["nodes"], room["state"] = tuple(physics_of(scene)), launch["node_offset"], launch
+    room["physics"], room["nodes"], room["state"] = tuple(physics_of(scene))[:-1], launch["node_offset"], launch
     return room
 
 
