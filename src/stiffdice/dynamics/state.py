@@ -120,9 +120,9 @@ def spin_of(cube: Cube, state: Any, nodes: Array | None = None) -> Array:
 
 
 def turned_tensor(cube: Cube, nodes: Array) -> Array:
-    """Return the tensor of inertia [kg m²], shape (3, 3), of a cube whose nodes, shape (8, 3), are turned like this."""
-    edges = np.einsum("ke,kx->ex", SIGNS, nodes) / len(SIGNS) / np.array(cube.half_sides)[:, None]
-    return np.asarray(edges.T @ cube.distribution.tensor @ edges)
+    """Return tensors of inertia [kg m²], shape (..., 3, 3), of a cube whose nodes, shape (..., 8, 3), are so turned."""
+    edges = np.einsum("ke,...kx->...ex", SIGNS, nodes) / len(SIGNS) / np.array(cube.half_sides)[:, None]
+    return np.asarray(np.einsum("...ei,ef,...fj->...ij", edges, cube.distribution.tensor, edges))
 
 
 class Ensemble(NamedTuple):
