@@ -126,7 +126,7 @@ def test_the_example_of_the_page_runs(tmp_path):
 def test_what_a_notebook_gets_wrong_is_told_in_one_line(tmp_path):
     scene = stiffdice.scene_from_mapping({"cube": {"side": 0.5}})
     wrong = [
-        (lambda: stiffdice.scene_from_mapping({"cube": {"sides": 1}}), "cube.sides: unknown key; .* mean side"),
+        (lambda: stiffdice.scene_from_mapping({"cube": {"sied": 1}}), "cube.sied: unknown key; .* mean side"),
         (lambda: stiffdice.load_scene(tmp_path / "none.yaml"), "none.yaml: No such file"),
         (lambda: stiffdice.simulate(scene, scheme="rk5"), "scheme = rk5: allowed is .*; did you mean rk4"),
         (lambda: stiffdice.advise(scene, -1), "error = -1"),

@@ -128,6 +128,11 @@ def checked_node_masses(given: object) -> tuple[float, ...]:
 def checked_sides(given: object) -> validation.Vector:
     """Return the sides of a box [m]; raises InputError."""
     given = validation.listed(given)
+    if not isinstance(given, (list, tuple)):
+        raise InputError(
+            f"cube.sides = {validation.shown(given)}: allowed are three numbers > 0, as [a, b, c] [m]; a cube has "
+            "cube.side"
+        )
     sides = validation.vector("cube.sides", given, "m")
     for axis, side in zip("xyz", sides, strict=True):
         validation.number(f"cube.sides[{axis}]", side, "m", above=0)
