@@ -96,13 +96,13 @@ def test_no_throw_depends_on_its_neighbours_or_on_threads():
 
 @pytest.mark.long
 def test_every_scheme_throws_the_same_die():
-    """At short steps most throws end on the same face, whatever the scheme: chaos takes a few."""
-    scene = scene_of(duration=1.2)
-    launches = THROWN.draw(scene, 100)
+    """Dropped so low that chaos has no time: at short steps throws end on the same face, whatever the scheme."""
+    scene = scene_of(duration=0.8, position=[0, 0, 0.03], velocity=[0.2, 0, 0])
+    launches = LaunchDistribution(velocity_spread=0.1, spin_spread=10.0).draw(scene, 100)
     best = land(scene, launches, scheme="event", steps=2000)
     for scheme in ("symplectic_euler", "velocity_verlet", "rk4", "implicit_euler"):
-        found = land(scene, launches, scheme=scheme, steps=200_000)
-        assert (found.face == best.face).mean() > 0.85, scheme
+        found = land(scene, launches, scheme=scheme, steps=100_000)
+        assert (found.face == best.face).mean() > 0.9, scheme
 
 
 def test_a_die_that_stands_on_an_edge_is_cocked():
