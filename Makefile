@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement engines study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -19,7 +19,10 @@ help:  ## show this list
 install:  ## set up .venv from the lock files, unless it is what they say (the other targets do it, too; status only tells)
 	@PYTHON="$(PYTHON)" requirements/install
 
-install-engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
+install-landing: install  ## how often each face of a die is up, and how coarse steps may be for that, into results/landing/
+	@$(RUN) landing
+
+engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
 	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
 
 paper: install  ## rebuild everything the paper shows, into results/paper/
@@ -36,6 +39,9 @@ tradeoff: install  ## what accuracy costs by scheme, into results/tradeoff/
 
 refinement: install  ## a dense grid's answer for fewer runs, into results/refinement/
 	@$(RUN) refinement
+
+landing: install  ## how often each face of a die is up, and how coarse steps may be for that, into results/landing/
+	@$(RUN) landing
 
 engines: install  ## the engines that are installed beside stiffdice, into results/engines/
 	@$(RUN) engines

@@ -20,9 +20,9 @@ SCHEMA = "workflow/schemas/study.schema.yaml"
 _WHOLE = 1e-12
 
 
-def whole(option: str, text: str) -> int:
+def whole(option: str, text: str, *, at_least: int = 1) -> int:
     """Return the whole number in an option's text; 1e5 counts as one."""
-    return validation.count(option, _value(text))
+    return validation.count(option, _value(text), at_least=at_least)
 
 
 def number(option: str, text: str, unit: str, *, above: float | None = None) -> float:

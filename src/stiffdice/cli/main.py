@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, archive, diff, inspect, rebuild, run, status, verify
+from stiffdice.cli import advise, archive, diff, inspect, rebuild, run, status, throw, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
 
@@ -22,6 +22,7 @@ examples:
   stiffdice run config/scenes/figure-09.yaml --dt '0.1 ms' --set ground.stiffness='500 kN/m' -o softer.h5
   stiffdice run config/scenes/figure-04.yaml --model auto -o throw.h5
   stiffdice advise config/scenes/figure-04.yaml --error 1%
+  stiffdice throw --count 100000
   stiffdice inspect stiff.h5
   stiffdice diff stiff.h5 softer.h5
   make archive STUDY=quick
@@ -59,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in (run, advise, inspect, diff, status, archive, verify, rebuild):
+    for module in (run, throw, advise, inspect, diff, status, archive, verify, rebuild):
         command = commands.add_parser(
             module.__name__.rpartition(".")[2],
             help=module.HELP,

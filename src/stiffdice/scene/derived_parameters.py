@@ -33,7 +33,8 @@ Resolved = tuple[dict[str, Any], tuple[str, ...]]
 def excluded(section: str, key: str) -> set[str]:
     """Return the keys of a section that say the same as one of them: giving it anew leaves them out."""
     pairs = INSTEAD.get(section, {})
-    return {other for pair in pairs.items() if key in pair for other in pair if other != key}
+    same = {stored for given, stored in pairs.items() if key in (given, stored)}
+    return {part for pair in pairs.items() if pair[1] in same for part in pair} - {key}
 
 
 # Keys that are stored beside those that follow from them: both may be given, if they agree.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -44,3 +47,13 @@ def face_below(directions: Array, rest: Array) -> npt.NDArray[np.intp]:
     of `rest_heights`.
     """
     return np.asarray((directions @ NORMALS.T / rest).argmax(axis=-1) + 1)
+
+
+# A die over a table, as a scene's plain data; that of `config/scenes/die.yaml`.
+SCENE: Mapping[str, Any] = {
+    "cube": {"side": "16 mm", "mass": "5 g"},
+    "ground": {"restitution": 0.5, "contact_time": "1 ms", "friction": 0.2},
+    "launch": {"position": "[0, 0, 10] cm", "velocity": "[1, 0, 0] m/s", "node_velocity": "rigid"},
+    "gravity": 9.81,
+    "duration": 2.0,
+}

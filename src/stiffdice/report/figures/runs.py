@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -15,6 +16,9 @@ from stiffdice.report.figures import style
 from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
 from stiffdice.report.number_format import describe, scene_of
 from stiffdice.scene.cube import LINKS
+
+# Seconds that an animation of a short run lasts.
+_SHORTEST_ANIMATION = 6.0
 
 
 def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
@@ -30,15 +34,19 @@ start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
 
 
 def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
-    """Return the whole run in real time."""
+    """Return the whole run, in real time unless it would be over in less than some seconds."""
     run = next(iter(runs.values()))
     figure, show = _stage(run, title)
     clock = figure.text(0.99, 0.97, "", ha="right", va="top")
-    count = max(2, round(float(run.time[-1]) * FRAMES_PER_SECOND))
+    duration = float(run.time[-1])
+    slower = max(1, math.ceil(_SHORTEST_ANIMATION / duration)) if duration < _SHORTEST_ANIMATION / 2 else 1
+    digits = 1 if slower == 1 else 3
+    told = "" if slower == 1 else f", slowed down {slower} times"
+    count = max(2, round(slower * duration * FRAMES_PER_SECOND))
     indices = np.linspace(0, run.sizes["time"] - 1, count).round().astype(int)
 
     def frame(number: int) -> list[Any]:
-        clock.set_text(f"t = {float(run.time[indices[number]]):4.1f} s")
+        clock.set_text(f"t = {float(run.time[indices[number]]):4.{digits}f} s{told}")
         return [*show(int(indices[number])), clock]
 
     return Animation(figure, frame, count)
@@ -50,18 +58,21 @@ def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[An
     figure.set_layout_engine("none")
     style.add_note(figure, describe(run, law=True))
     axes: Any = figure.add_axes((-0.26, -0.22, 1.44, 1.44), projection="3d", computed_zorder=False)
-    # A box, on whole metres, that holds the cube for the whole run.
+    # A box, on whole units, that holds the cube for the whole run; the unit is a metre for the cube of the paper.
     reach = float(np.linalg.norm(run.node_offset.values[0], axis=-1).max())
-    low, high = np.floor(run.position.values.min(axis=0) - reach), np.ceil(run.position.values.max(axis=0) + reach)
+    unit = 10.0 ** math.floor(math.log10(reach / 0.5))
+    low = np.floor((run.position.values.min(axis=0) - reach) / unit) * unit
+    high = np.ceil((run.position.values.max(axis=0) + reach) / unit) * unit
     middle = (low[1] + high[1]) / 2
-    low[1], high[1] = min(low[1], middle - 3), max(high[1], middle + 3)
+    low[1], high[1] = min(low[1], middle - 3 * unit), max(high[1], middle + 3 * unit)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
     axes.set_box_aspect((high[0] - low[0], high[1] - low[1], high[2]), zoom=1.25)
     axes.view_init(elev=18, azim=-70)
-    # The plane n·x = 0 under the run, with a grid of two metres.
+    # The plane n·x = 0 under the run, with a grid of two units.
     nx, ny, nz = scene_of(run)["ground"]["normal"]
     if nz != 0:  # a wall has no height over x and y
-        x, y = np.meshgrid(*([low[k], *np.arange(low[k] // 2 * 2 + 2, high[k], 2), high[k]] for k in (0, 1)))
+        lines = [np.arange(low[k] // (2 * unit) * 2 * unit + 2 * unit, high[k], 2 * unit) for k in (0, 1)]
+        x, y = np.meshgrid(*([low[k], *lines[k], high[k]] for k in (0, 1)))
         z = -(nx * x + ny * y) / nz
         look: dict[str, Any] = {"color": "#f3eee4", "edgecolor": style.FAINT, "linewidth": 0.6, "shade": False}
         axes.plot_surface(x, y, z, rstride=1, cstride=1, zorder=0, clip_on=False, **look)
@@ -73,8 +84,8 @@ def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[An
     axes.set_xlabel("x [m]", labelpad=10)
     axes.set_ylabel("y [m]", labelpad=2)
     axes.set_zlabel("z [m]", labelpad=-6)
-    axes.set_yticks(np.arange(np.ceil(low[1] / 2) * 2, high[1] + 1, 2))
-    axes.set_zticks([0, 2, 4])
+    axes.set_yticks(np.arange(np.ceil(low[1] / 2 / unit) * 2 * unit, high[1] + unit, 2 * unit))
+    axes.set_zticks([0, 2 * unit, 4 * unit])
     axes.tick_params(labelsize=7.5, pad=-1)
     places, nodes = run.position.values, run.position.values[:, None] + run.node_offset.values
     look = {"colors": style.BLUE, "linewidths": 1.3, "zorder": 4, "clip_on": False}

@@ -1,0 +1,95 @@
+"""`stiffdice throw`: a die, its face, and how often each face is up."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from stiffdice.cli import common
+from stiffdice.errors import InputError
+
+_DPI = 120
+
+HELP = "throw a die: which face is up, and how often each is in many throws"
+EXAMPLES = """\
+examples:
+  stiffdice throw
+  stiffdice throw --count 100000
+  stiffdice throw --seed 7 --animate throw.gif
+  stiffdice throw config/scenes/die.yaml --set cube.load='{at: corner, mass: 1 g}' --count 20000
+  stiffdice throw config/scenes/die.yaml --set cube.sides='[16, 16, 20] mm' --set cube.radius= --count 20000
+
+Without a scene it is a 16 mm die over a table. Pips: 1 up, 2 to the front, 3 to the left of an upright die; opposite
+faces sum to seven. Every throw of a seed is the same again. Exit status: 0 when thrown, 2 for bad input.
+"""
+
+
+def add(command: argparse.ArgumentParser) -> None:
+    """Add its options to the command."""
+    command.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="the die and the ground (default: a 16 mm die)")
+    command.add_argument("--count", default="1", metavar="N", help="number of throws (default: 1)")
+    command.add_argument("--seed", default="0", metavar="S", help="of the random launches (default: 0)")
+    told = "uniform: over all rotations; as_launched: the scene's (default: uniform)"
+    command.add_argument("--orientation", default="uniform", metavar="O", help=told)
+    told = "standard deviation of each component of the velocity (default: 0.3 m/s)"
+    command.add_argument("--velocity-spread", default="0.3", metavar="V", help=told)
+    told = "of the angular velocity (default: 30 rad/s); `scene` draws the angular momentum as the scene says"
+    command.add_argument("--spin-spread", default="30", metavar="W", help=told)
+    command.add_argument("--scheme", default="symplectic_euler", metavar="NAME", help="default: symplectic_euler")
+    command.add_argument("--steps", metavar="N", help="to the scene's duration (default: such that ω h is 0.3)")
+    command.add_argument("--animate", metavar="FILE.gif", help="draw one throw as it goes")
+    command.add_argument("--json", action="store_true", help="print the result as JSON")
+    common.add_changes(command)
+
+
+def call(options: argparse.Namespace) -> None:
+    """Throw, and print the face, or how often each was up."""
+    from stiffdice.scene import die
+    from stiffdice.scene import scene as scenes
+    from stiffdice.simulation.launch_distribution import LaunchDistribution
+
+    if options.scene is None:
+        scene = scenes.changed(die.SCENE, options.overrides, options.preset)
+    else:
+        scene = scenes.load(options.scene, options.overrides, options.preset)
+    count = common.whole("--count", options.count)
+    spread = None if options.spin_spread == "scene" else common.number("--spin-spread", options.spin_spread, "rad/s")
+    launches = LaunchDistribution(
+        orientation=options.orientation,
+        velocity_spread=common.number("--velocity-spread", options.velocity_spread, "m/s"),
+        spin_spread=spread,
+        seed=common.whole("--seed", options.seed, at_least=0),
+    )
+    if options.animate is not None and (count != 1 or not options.animate.endswith(".gif")):
+        raise InputError(f"--animate = {options.animate}: allowed is a name that ends with .gif, of one throw")
+
+    from stiffdice.experiments.dice import throws
+
+    steps = throws.default_steps(scene) if options.steps is None else common.whole("--steps", options.steps)
+    if count == 1:
+        thrown = throws.one(scene, launches, options.scheme, steps)
+        _show(options, throws.told_of_one(thrown), thrown.as_mapping())
+        if options.animate is not None:
+            _animate(thrown.run, Path(options.animate), f"A die thrown: {thrown.face} is up")
+        return
+    from stiffdice.cli.progress import progress
+
+    with progress("") as show:
+        many = throws.many(scene, launches, options.scheme, steps, count, progress=show)
+    _show(options, throws.told_of_many(many), many.as_mapping())
+
+
+def _show(options: argparse.Namespace, lines: list[str], mapping: dict[str, Any]) -> None:
+    print(json.dumps(mapping, indent=2) if options.json else "\n".join(lines))
+
+
+def _animate(run: Any, target: Path, title: str) -> None:
+    """Draw a run as it goes."""
+    from stiffdice.io.writer import check_target
+    from stiffdice.report.figures import registry
+    from stiffdice.simulation.dataset import run_dataset
+
+    check_target(target)
+    registry.draw("animation", {"throw": run_dataset(run)}, title, _DPI, [str(target)])

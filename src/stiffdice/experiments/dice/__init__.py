@@ -1,0 +1,1 @@
+"""What dice tell: faces of many throws, by body, ground and steps."""

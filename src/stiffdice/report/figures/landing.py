@@ -1,0 +1,81 @@
+"""Figures of landings: how often each face is up, and what coarse steps do to that and to paths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from stiffdice.io.cf_enums import meanings_of
+from stiffdice.report.figures import style
+
+# By place among the experiments.
+_LOOKS = [(style.BLUE, "o"), (style.VERMILION, "s"), (style.GREEN, "D"), (style.ORANGE, "^"), (style.PURPLE, "v")]
+_SCHEMES = {"symplectic_euler": style.BLUE, "velocity_verlet": style.GREEN, "rk4": style.VERMILION}
+# What the issue of coarse steps aims at: a distance of distributions, and a part of the way thrown.
+_DISTANCE, _PATH = 0.003, 0.01
+
+
+def faces(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return the probability of each face with its 95 % interval, of every die."""
+    figure = style.new_figure(title, height=3.4)
+    panel = figure.subplots()
+    panel.axhline(1 / 6, label="fair: 1/6", **style.THEORY)
+    for k, (name, dataset) in enumerate(experiments.items()):
+        colour, marker = _LOOKS[k % len(_LOOKS)]
+        place = dataset.face.values + 0.12 * (k - (len(experiments) - 1) / 2)
+        share = dataset.probability.values
+        bars = share - dataset.probability_low.values, dataset.probability_high.values - share
+        label = f"{name}, {int(dataset['count'].sum()):,} throws".replace(",", " ", 0)
+        panel.errorbar(place, share, bars, color=colour, marker=marker, markersize=4.5, linestyle="none", label=label)
+    panel.set(xlabel="face up [pips]", ylabel="probability [1]", xticks=range(1, 7), ylim=(0, None))
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def coarse_steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
+    """Return total variation, changed faces and error of paths against force evaluations, a column for each scene."""
+    figure = style.new_figure(title, width=3.0 * len(experiments) + 0.6, height=7.2)
+    panels = figure.subplots(3, len(experiments), sharey="row", sharex="col", squeeze=False)
+    for column, (name, dataset) in enumerate(experiments.items()):
+        _distributions(panels[0, column], dataset)
+        panels[0, column].set_title(f"{name}\n{int(dataset.attrs['throws']):,} throws at each step size")
+        _paths(panels[1, column], dataset, "face_changed")
+        _paths(panels[2, column], dataset, "path_error")
+        panels[2, column].set_yscale("log")
+        panels[2, column].axhline(_PATH, color=style.QUIET, linewidth=0.8, linestyle=":")
+        panels[2, column].set_xlabel("force evaluations of a throw [1]")
+    for row, text in enumerate(("total variation of faces [1]", "share of faces changed [1]", "error of the path [1]")):
+        panels[row, 0].set_ylabel(text)
+    handles = [
+        style.mark("faces: symplectic Euler, numbers are ωh", color=style.BLUE, marker="o"),
+        style.area("two samples of one distribution: 95 % are below", style.FAINT),
+        *(style.line(f"paths: {name.replace('_', ' ')}", color=colour) for name, colour in _SCHEMES.items()),
+        style.line(f"aims: {_DISTANCE:g} of faces, {_PATH:.0%} of a path", color=style.QUIET, linestyle=":"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _distributions(panel: Any, dataset: xr.Dataset) -> None:
+    work, distance = dataset.evaluations.values, dataset.total_variation.values
+    order = np.argsort(work)
+    panel.fill_between(work[order], 1e-4, dataset.sampling_95.values[order], color=style.FAINT, linewidth=0)
+    panel.plot(work[order], distance[order], color=style.BLUE, marker="o", markersize=4)
+    for x, y, value in zip(work, distance, dataset.omega_h.values, strict=True):
+        panel.annotate(f"{value:g}", (x, y), xytext=(2, 4), textcoords="offset points", fontsize=7)
+    panel.axhline(_DISTANCE, color=style.QUIET, linewidth=0.8, linestyle=":")
+    panel.set(xscale="log", yscale="log", ylim=(2e-4, 1))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _paths(panel: Any, dataset: xr.Dataset, name: str) -> None:
+    for k, scheme in enumerate(meanings_of(dataset.scheme)):
+        work, values = dataset.path_evaluations.values[k], dataset[name].values[k]
+        panel.plot(work, values, color=_SCHEMES[scheme], marker="s", markersize=3.5)
+    if name == "face_changed":
+        panel.set_ylim(0, 1)
