@@ -12,6 +12,7 @@ BENCHMARKS: dict[str, str] = {
     "ensemble": "benchmarks.ensemble",
     "octave": "benchmarks.octave",
     "engines": "benchmarks.engines",
+    "landing": "benchmarks.landing",
     "skipping": "benchmarks.skipping",
     "cold": "benchmarks.cold",
     "jobs": "benchmarks.jobs",

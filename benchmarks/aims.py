@@ -81,6 +81,7 @@ RATIOS = (
     Aim("sliding, ungated: share of the FMA peak", "fma_peak", "ensemble_sliding_ungated", share=True),
     Aim("tumbling, ungated: share of the FMA peak", "fma_peak", "ensemble_tumbling_ungated", share=True),
     Aim("tumbling, gated: share of the FMA peak", "fma_peak", "ensemble_tumbling_gated", share=True),
+    Aim("fair die until decided: MuJoCo's rollout over ours", "mujoco_rollout_landing", "landing_fair", 100),
     Aim("gated sweep at S = 10⁸, vertical: stepped over skipping", "sweep_vertical_stepped", "sweep_vertical", 100),
     Aim("gated sweep at S = 10⁸, tumbling: stepped over skipping", "sweep_tumbling_stepped", "sweep_tumbling", 20),
 )

@@ -11,6 +11,7 @@ from benchmarks.case import Case, Effort, Missing
 from benchmarks.scenes import STEP_SIZE, scene_of
 from stiffdice.dynamics.state import Ensemble
 from stiffdice.errors import NotInstalledError
+from stiffdice.scene.scene import Scene
 from stiffdice.simulation.engines.registry import adapter_of
 from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.run import simulate
@@ -73,20 +74,23 @@ def _rollout(model: str, members: Ensemble, steps: int, effort: Effort) -> Case 
         f"{count} members, {model}, gated: MuJoCo's rollout, the first {steps * STEP_SIZE:g} s",
         "step",
         count * steps,
-        lambda: _rolling(adapter, scene, model, members, steps),
+        lambda: rolling(adapter, scene, model, members, steps),
         effort.slow,
         "a general engine: collisions are looked for and a solver is called every step",
         version=adapter.version(),
     )
 
 
-def _rolling(adapter: Any, scene: Any, model: str, members: Ensemble, steps: int) -> Callable[[], object]:
+def rolling(
+    adapter: Any, scene: Scene, model: str, members: Ensemble, steps: int, h: float = STEP_SIZE, threads: int = 1
+) -> Callable[[], object]:
+    """Return what takes so many steps of h [s] of each member with MuJoCo's rollout."""
     from mujoco import MjData, mj_getState, mj_stateSize, mjtState, rollout
 
-    standing = [adapter(scene, model, members.launches[k : k + 1], STEP_SIZE) for k in range(len(members.launches))]
+    standing = [adapter(scene, model, members.launches[k : k + 1], h) for k in range(len(members.launches))]
     models, kind = [engine._model for engine in standing], mjtState.mjSTATE_FULLPHYSICS
     states = np.empty((len(standing), mj_stateSize(models[0], kind)))
     for engine, state in zip(standing, states, strict=True):
         mj_getState(engine._model, engine._data, state, kind)
-    data = MjData(models[0])
+    data = [MjData(models[0]) for _ in range(threads)]
     return lambda: rollout.rollout(models, data, states, nstep=steps)
