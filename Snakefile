@@ -5,6 +5,7 @@
 #   snakemake extremes                    where and how runs fail at the extremes
 #   snakemake tradeoff                    what accuracy costs, by scheme
 #   snakemake refinement                  whether fewer runs, put where members disagree, say as much
+#   snakemake landing                     how often each face of a die is up, and how coarse steps may be for that
 #   snakemake engines                     other engines beside stiffdice, as far as they are installed
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
@@ -61,6 +62,11 @@ rule tradeoff:
 rule refinement:
     input:
         lambda wildcards: everything_of("refinement"),
+
+
+rule landing:
+    input:
+        lambda wildcards: everything_of("landing"),
 
 
 rule engines:
