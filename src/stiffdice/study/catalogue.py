@@ -14,7 +14,8 @@ class Entry(NamedTuple):
     """Where a function is, and what it is given.
 
     given: `runs`, `sweeps`, `experiments` or `timings`; the last two of the kind `measures`. timed: whether it takes
-    timings of that kind besides.
+    timings of that kind besides. on_its_ground: whether an experiment takes the scene's ground as it is, so that it may
+    be given by its restitution.
     """
 
     module: str
@@ -22,6 +23,7 @@ class Entry(NamedTuple):
     given: str = ""
     measures: str = ""
     timed: bool = False
+    on_its_ground: bool = False
 
     def load(self) -> Callable[..., Any]:
         """Return the function."""
@@ -87,8 +89,8 @@ EXPERIMENTS: dict[str, Entry] = {
     "precision-limits": Entry("stiffdice.experiments.precision_limits", "measure"),
     "model-ablation": Entry("stiffdice.experiments.model_ablation", "measure"),
     "held-contacts": Entry("stiffdice.experiments.held_contacts", "measure"),
-    "landing": Entry("stiffdice.experiments.dice.landing", "measure"),
-    "coarse-steps": Entry("stiffdice.experiments.dice.coarse_steps", "measure"),
+    "landing": Entry("stiffdice.experiments.dice.landing", "measure", on_its_ground=True),
+    "coarse-steps": Entry("stiffdice.experiments.dice.coarse_steps", "measure", on_its_ground=True),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
     "engine-contact": Entry("stiffdice.experiments.engines", "contact"),
     "engine-limits": Entry("stiffdice.experiments.engines", "limits"),

@@ -283,7 +283,9 @@ def _experiment(
     measure, changes = experiment["measure"], tuple(experiment.get("set", ()))
     options = dict(experiment.get("options", {}))
     validation.choice("measure", measure, registry)
-    _refuse_restitution(scenes.load(experiment["scene"], changes), "an experiment may take others")
+    scene = scenes.load(experiment["scene"], changes)
+    if not registry[measure].on_its_ground:
+        _refuse_restitution(scene, "an experiment may take others")
     parameters = inspect.signature(registry[measure].load()).parameters.values()
     known = {part.name: part.default for part in parameters if part.kind is part.KEYWORD_ONLY}
     validation.known_keys("options", options, known)
