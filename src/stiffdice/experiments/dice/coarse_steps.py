@@ -59,8 +59,9 @@ def measure(
     path_schemes: Sequence[str] = ("symplectic_euler", "velocity_verlet", "rk4"),
     paths: int = 200,
     orientation: str = "uniform",
-    velocity_spread: float | str = 0.3,
-    spin_spread: float | str | None = 30.0,
+    velocity_spread: float = 0.3,
+    spin: str = "gaussian",
+    spin_spread: float = 30.0,
     seed: int = 0,
 ) -> xr.Dataset:
     """Return what steps do to the faces' distribution, dimension omega_h, and to paths, scheme and path_omega_h.
@@ -70,7 +71,7 @@ def measure(
     path_omega_h, path_schemes, paths: steps, schemes and number of launches for paths, compared with `event`. The rest
     as in `landing.measure`. Raises InputError for a value out of range.
     """
-    launches = launches_of(orientation, velocity_spread, spin_spread, seed)
+    launches = launches_of(orientation, velocity_spread, spin, spin_spread, seed)
     throws, paths = validation.count("throws", throws), validation.count("paths", paths)
     ladder = numbers("omega_h", omega_h, "1", above=0)
     finest = validation.number("finest", finest, "1", above=0)
@@ -82,7 +83,7 @@ def measure(
     found |= _paths(scene, launches, path_schemes, numbers("path_omega_h", path_omega_h, "1", above=0), paths)
     found |= coordinates(face=die.FACES, omega_h=ladder, path_omega_h=list(path_omega_h), scheme=list(path_schemes))
     told = {"throws": throws, "paths": paths, "finest_omega_h": finest, "seed": seed, "orientation": orientation}
-    told |= {"velocity_spread": str(velocity_spread), "spin_spread": str(spin_spread)}
+    told |= {"velocity_spread": launches.velocity_spread, "spin": spin, "spin_spread": spin_spread}
     return result(found, "What coarse steps do to faces and to paths", scene, MODEL, BATCHED, __name__, **told)
 
 

@@ -17,17 +17,18 @@ from stiffdice.scene.scene import Scene
 from stiffdice.simulation.landing import BATCHED, MODEL, Rest
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 
+# How spins are drawn: about the scene's, or as its {seed, low, high} says.
+SPINS = ("gaussian", "scene")
 # Of the times to the decision.
 _QUANTILES = (0.01, 0.1, 0.5, 0.9, 0.99)
 
 
 def launches_of(
-    orientation: str, velocity_spread: float | str, spin_spread: float | str | None, seed: int
+    orientation: str, velocity_spread: float, spin: str, spin_spread: float, seed: int
 ) -> LaunchDistribution:
     """Return the distribution that an experiment's options say; raises InputError."""
-    velocity = validation.number("velocity_spread", velocity_spread, "m/s", at_least=0)
-    spin = None if spin_spread in (None, "scene") else validation.number("spin_spread", spin_spread, "rad/s")
-    return LaunchDistribution(orientation, velocity, spin, seed)
+    gaussian = validation.choice("spin", spin, SPINS) == "gaussian"
+    return LaunchDistribution(orientation, velocity_spread, spin_spread if gaussian else None, seed)
 
 
 def measure(
@@ -36,18 +37,20 @@ def measure(
     throws: int = 200_000,
     steps: int | None = None,
     orientation: str = "uniform",
-    velocity_spread: float | str = 0.3,
-    spin_spread: float | str | None = 30.0,
+    velocity_spread: float = 0.3,
+    spin: str = "gaussian",
+    spin_spread: float = 30.0,
     seed: int = 0,
 ) -> xr.Dataset:
     """Return counts and probabilities of the faces of a die, dimension face, and times to the decision.
 
     scene: the die, its ground and the mean launch. throws: how many. steps: to the scene's duration; None takes those
     at which the fastest contact has ωh = 0.3. orientation: `uniform` or `as_launched`. velocity_spread [m/s] and
-    spin_spread [rad/s]: standard deviations of each component; `scene` draws the spin as the scene's {seed, low, high}.
+    spin_spread [rad/s]: standard deviations of each component. spin: `gaussian`, or `scene`, which draws the angular
+    momentum as the scene's {seed, low, high} says.
     Raises InputError for a value out of range, and where no throw settles.
     """
-    launches = launches_of(orientation, velocity_spread, spin_spread, seed)
+    launches = launches_of(orientation, velocity_spread, spin, spin_spread, seed)
     steps = throwing.default_steps(scene) if steps is None else validation.count("steps", steps)
     many = throwing.many(scene, launches, BATCHED, steps, validation.count("throws", throws), threads=1)
     low, high = counting.intervals(many.counts)
@@ -64,5 +67,5 @@ def measure(
     }
     axes = coordinates(face=die.FACES, quantile=_QUANTILES, rest=[rest.name.lower() for rest in Rest])
     told = {"steps": steps, "throws": throws, "seed": seed, "orientation": orientation}
-    told |= {"velocity_spread": str(velocity_spread), "spin_spread": str(spin_spread)}
+    told |= {"velocity_spread": launches.velocity_spread, "spin": spin, "spin_spread": spin_spread}
     return result(found | axes, "Faces of a die thrown many times", scene, MODEL, BATCHED, __name__, **told)
