@@ -60,7 +60,7 @@ def asked_for(words: list[str]) -> list[str]:
 def written_since(begun: float, studies: list[str], pattern: str) -> list[Path]:
     """Return the files of some studies that match a pattern and were written after `begun`."""
     found = (path for name in studies for path in sorted((ROOT / "results" / name).glob(pattern)))
-    return [path for path in found if path.stat().st_mtime >= begun]
+    return [path for path in found if path.lstat().st_mtime >= begun]
 
 
 def jobs_since(begun: float, studies: list[str]) -> dict[str, list[tuple[float, float]]]:

@@ -15,7 +15,7 @@ from stiffdice import __version__
 from stiffdice.cli import main as cli
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ["", "run", "advise", "inspect", "diff", "status", "archive", "verify", "rebuild"]
+COMMANDS = ["", "run", "advise", "throw", "inspect", "diff", "status", "archive", "verify", "rebuild"]
 
 
 def examples(command: str) -> list[list[str]]:

@@ -19,7 +19,7 @@ examples:
   stiffdice throw --count 100000
   stiffdice throw --seed 7 --animate throw.gif
   stiffdice throw config/scenes/die.yaml --set cube.load='{at: corner, mass: 1 g}' --count 20000
-  stiffdice throw config/scenes/die.yaml --set cube.sides='[16, 16, 20] mm' --set cube.radius= --count 20000
+  stiffdice throw config/scenes/die.yaml --set cube.sides='[16, 16, 20] mm' --count 20000
 
 Without a scene it is a 16 mm die over a table. Pips: 1 up, 2 to the front, 3 to the left of an upright die; opposite
 faces sum to seven. Every throw of a seed is the same again. Exit status: 0 when thrown, 2 for bad input.
