@@ -10,8 +10,10 @@ import time
 import numpy as np
 import pytest
 
+from stiffdice.advice.pilot import PATIENCE, SAMPLES, tried
 from stiffdice.advice.recommend import advise
 from stiffdice.cli.main import main
+from stiffdice.dynamics.model_selection import least_model
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.reader import open_file
@@ -36,14 +38,15 @@ def extreme(kind, law):
 
 @pytest.mark.parametrize("kind", EXTREMES)
 @pytest.mark.parametrize("law", ["gated", "ungated"])
-@pytest.mark.parametrize("steps", [1, 10_000])
+@pytest.mark.parametrize(("steps", "share"), [(1, 1.0), (10_000, 0.1)])
 @pytest.mark.long
-def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps):
-    """A few seconds of work, however the intervals are."""
-    begun = time.process_time()
-    run = simulate(extreme(kind, law), scheme="event", steps=steps, every=steps)
-    assert time.process_time() - begun < 60  # compiling included
-    assert run.evaluations[0] <= schemes.BUDGET + schemes.PART + 200
+def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps, share):
+    """A few seconds of work, however the intervals are; of such a share of the budget."""
+    simulate(extreme(kind, law), scheme="event", steps=1, budget=1)  # compiles
+    given, begun = {} if share == 1 else {"budget": round(share * schemes.BUDGET)}, time.process_time()
+    run = simulate(extreme(kind, law), scheme="event", steps=steps, every=steps, **given)
+    assert time.process_time() - begun < 60 * share
+    assert run.evaluations[0] <= share * schemes.BUDGET + schemes.PART + 200
     ended = Verdict(run.verdict[0])
     assert (run.steps_done[0] == steps) == (ended in (Verdict.PASSED, Verdict.SANK))
     assert ended in (Verdict.PASSED, Verdict.SANK, Verdict.UNDECIDED, Verdict.LEFT_NUMERIC_RANGE)
@@ -110,15 +113,17 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
 @pytest.mark.parametrize("law", ["gated", "ungated"])
 @pytest.mark.long
 def test_advise_ends_soon_whatever_the_scene(kind, law):
-    """With advice, for a part of the time at least, or by saying that it finds no path."""
+    """With advice, for a part of the time at least, or by saying that it finds no path: by its patience, in seconds."""
+    share, scene = 0.1, extreme(kind, law)
+    tried(scene, least_model(scene, scene.duration / SAMPLES)[0], "event", SAMPLES, budget=1)  # compiles
     begun = time.process_time()
     try:
-        advice = advise(extreme(kind, law), 0.01, scheme="event")
+        advice = advise(scene, 0.01, scheme="event", patience=round(share * PATIENCE))
     except InputError as refused:
         assert "no path" in str(refused)
     else:
         assert 0 < advice.horizon <= advice.duration
-    assert time.process_time() - begun < 60  # compiling included
+    assert time.process_time() - begun < 60 * share
 
 
 LONG = {
@@ -140,7 +145,7 @@ def test_ctrl_c_ends_a_run_at_once(kind, tmp_path):
     words = [sys.executable, "-m", "stiffdice.cli", *LONG[kind].split()]
     with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as started:
         with pytest.raises(subprocess.TimeoutExpired):  # started, and at work
-            started.wait(5)
+            started.wait(3)
         begun = time.monotonic()
         started.send_signal(signal.SIGINT)
         _, told = started.communicate(timeout=30)
