@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import shutil
 import subprocess
@@ -20,22 +21,30 @@ def copy(tmp_path) -> Path:
     return target
 
 
-def python(copy, code, **environment):
+def python(copy, code, *words, **environment):
     path = {"PYTHONPATH": str(copy.parent)} | environment
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, **path}
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=True, env={**os.environ, **path}
     )
     return done.stdout.strip()
 
 
-def digest_of(copy, module):
-    return python(copy, f"from stiffdice.dynamics.code_digest import code_digest; print(code_digest({module!r}))")
+DIGESTS = """
+import json, sys
+from stiffdice.dynamics.code_digest import code_digest
+print(json.dumps({module: code_digest(module) for module in sys.argv[1:]}))
+"""
+
+
+def digests_of(copy, modules):
+    return json.loads(python(copy, DIGESTS, *modules))
 
 
 SIMULATION = {"stiffdice.simulation.run", "stiffdice.sweep.shard", "stiffdice.simulation.dataset"}
 DRAWING = {"stiffdice.report.figures.runs"}
 COMPARING = {"stiffdice.experiments.work_precision.measure"}
 DRIVING = {"stiffdice.simulation.engines.registry"}
+EACH = SIMULATION | DRAWING | COMPARING | DRIVING
 
 
 @pytest.mark.parametrize(
@@ -59,11 +68,10 @@ DRIVING = {"stiffdice.simulation.engines.registry"}
 )
 @pytest.mark.long
 def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, touches):
-    before = {module: digest_of(copy, module) for module in SIMULATION | DRAWING | COMPARING | DRIVING}
     with (copy / changed).open("a") as file:
         file.write("\n# changed\n")
-    after = {module: digest_of(copy, module) for module in before}
-    assert {module for module in before if before[module] != after[module]} == touches
+    after = digests_of(copy, EACH)
+    assert {module for module in EACH if code_digest(module) != after[module]} == touches
 
 
 def test_imports_are_those_that_python_finds():
@@ -80,7 +88,7 @@ def test_imports_are_those_that_python_finds():
 
 
 def test_digests_do_not_depend_on_where_the_code_lies(copy):
-    assert digest_of(copy, "stiffdice.sweep.shard") == code_digest("stiffdice.sweep.shard")
+    assert digests_of(copy, EACH) == {module: code_digest(module) for module in EACH}
 
 
 # A kernel that compiles quickly, and calls what another file says of a height.
