@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.forks import run_module
 
 from stiffdice.io import host
 from stiffdice.io.writer import whole
@@ -16,10 +17,7 @@ pytestmark = pytest.mark.workflow
 
 
 def status(project) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "stiffdice.cli", "status", "small"]
-    return subprocess.run(
-        command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
-    )
+    return run_module("stiffdice.cli", "status", "small", cwd=project.folder, environment=project.environment)
 
 
 @pytest.mark.long

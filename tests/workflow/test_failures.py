@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from tests import rounds
+from tests.forks import run_module
 from tests.workflow.test_workflow import Project, planned
 
 from stiffdice.study import outputs
@@ -46,14 +47,8 @@ def make(project: Project, most: int = resource.RLIM_INFINITY) -> subprocess.Com
 
 
 def status(project: Project, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "stiffdice.cli", "status", "tiny", *arguments],
-        cwd=project.folder,
-        env=project.environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    words = ("status", "tiny", *arguments)
+    return run_module("stiffdice.cli", *words, cwd=project.folder, environment=project.environment)
 
 
 @pytest.fixture(scope="module")
@@ -137,5 +132,5 @@ def test_once_mended_the_same_command_completes(failed):
     assert ended.returncode == 0, ended.stderr
     assert "what failed" not in ended.stdout
     assert (top / f"sweeps/large/shards/{second}.h5").stat().st_mtime_ns == kept
-    assert status(project).returncode == 0
-    assert "results     8 of 8 done\n" in status(project).stdout
+    told = status(project)
+    assert (told.returncode, "results     8 of 8 done\n" in told.stdout) == (0, True)

@@ -6,11 +6,11 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from tests.forks import run_module
 from tests.workflow.test_workflow import TINY, Project
 
 pytestmark = pytest.mark.workflow
@@ -72,10 +72,7 @@ def change(project, name, before, after):
 
 
 def stiffdice(project, *arguments):
-    command = [sys.executable, "-m", "stiffdice.cli", *arguments]
-    return subprocess.run(
-        command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
-    )
+    return run_module("stiffdice.cli", *arguments, cwd=project.folder, environment=project.environment)
 
 
 def replaced_by_mv(old, new):
@@ -158,10 +155,9 @@ def test_what_is_asked_for_by_name_is_made_again_and_no_more(copied):
     change(copied, "tiny.yaml", "title: Position", "title: Place")
     change(copied, "tiny.yaml", "title: Books", "title: Ledger")
     forget(copied)
-    command = [sys.executable, "-m", "snakemake", "-n", "results/tiny/figures/books.svg"]
-    done = subprocess.run(
-        command, cwd=copied.folder, env=copied.environment, capture_output=True, text=True, check=True
-    )
+    asked = ("-n", "results/tiny/figures/books.svg")
+    done = run_module("snakemake", *asked, cwd=copied.folder, environment=copied.environment)
+    assert done.returncode == 0, done.stderr
     assert re.search(r"^figure +1\ntotal +1$", done.stdout + done.stderr, re.MULTILINE)
 
 
@@ -191,7 +187,7 @@ def test_what_is_stale_is_told_refused_and_made_again(copied):
     assert f"{run}: made from other scene, as 5 of " in told.stderr
     before = copied.results("runs/stiff*.h5", "experiments/*", "figures/position.svg", "figures/books.svg")
     others = copied.results("runs/turn*", "sweeps/**/*.h5", "tables/*", "figures/frontier.*", "benchmarks/timings/*.h5")
-    done = copied.snakemake()
+    done = copied.make("--cores", "2")
     assert done.returncode == 0, done.stderr
     assert all(content != before[name] for name, content in copied.results(*before).items())
     assert others == copied.results(*others)
