@@ -33,7 +33,7 @@ class Killer:
 
     def __init__(self, rng, seconds: float, names: set[str]):
         self._rng, self._names = rng, names
-        self._pace = seconds / len(names)  # seconds a result, measured anew whenever some were made
+        self._pace = seconds / len(names)  # seconds a result, at most; measured anew whenever some were made
         self.kills = Counter()
 
     def live(self, project) -> None:
@@ -93,17 +93,19 @@ class Killer:
 
 def _kind(process: psutil.Process) -> str:
     """Return what a process is: of jobs that are handed over both the script and the child that does it are one."""
-    words, above = _words(process), process.parent()
+    words = _words(process)
     if any(".snakemake/scripts" in word for word in words):
         return "job"
     if any("warm.py" in word for word in words):
-        return "job" if above and any("warm.py" in word for word in _words(above)) else "warm process"
+        return "job" if any("warm.py" in word for word in _words(process, above=True)) else "warm process"
     return "snakemake"
 
 
-def _words(process: psutil.Process) -> list[str]:
+def _words(process: psutil.Process, *, above: bool = False) -> list[str]:
+    """Return the command of a process, or of the one above it; nothing if it has ended in the meantime."""
     try:
-        return process.cmdline()
+        found = process.parent() if above else process
+        return found.cmdline() if found else []
     except psutil.Error:
         return []
 
