@@ -65,6 +65,9 @@ bench: install  ## measure how fast it is, into results/bench/, and compare with
 sweep-million: install  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into results/scale/ (about half an hour)
 	@$(BIN)/python -m benchmarks.scale $(MILLION)
 
+# Where the environment says to keep no bytecode, each worker would prepare all tests, and each process compile all code.
+test test-fast: export PYTHONDONTWRITEBYTECODE =
+
 test: install  ## run all tests
 	@$(BIN)/python -m pytest
 
