@@ -29,7 +29,10 @@ def become(asked):
     numba.config.reload_config()
     sys.path[:1] = [asked["folder"], *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
     sys.argv = ["", *asked["words"]]
-    runpy.run_module(asked["module"], run_name="__main__", alter_sys=True)
+    if "code" in asked:
+        exec(asked["code"], {"__name__": "__main__"})
+    else:
+        runpy.run_module(asked["module"], run_name="__main__", alter_sys=True)
 
 def status_of(asked):
     try:
@@ -63,14 +66,27 @@ def _server() -> subprocess.Popen[str]:
     return server
 
 
+def _run(
+    asked: dict[str, str], words: tuple[str, ...], folder: Path, environment: dict[str, str] | None
+) -> subprocess.CompletedProcess[str]:
+    server = _server()
+    with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
+        files = {"out": out.name, "err": err.name, "folder": str(folder)}
+        given = {"words": words, "environment": {**(environment or os.environ)}}
+        print(json.dumps(asked | files | given), file=server.stdin, flush=True)
+        status = int(server.stdout.readline())
+        return subprocess.CompletedProcess([*asked.values(), *words], status, out.read(), err.read())
+
+
 def run_module(
     module: str, *words: str, cwd: Path, environment: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Do what `python -m module words` does, and return what `subprocess.run` would."""
-    server = _server()
-    with tempfile.NamedTemporaryFile("r") as out, tempfile.NamedTemporaryFile("r") as err:
-        files = {"out": out.name, "err": err.name, "folder": str(cwd)}
-        asked = {"module": module, "words": words, "environment": {**(environment or os.environ)}, **files}
-        print(json.dumps(asked), file=server.stdin, flush=True)
-        status = int(server.stdout.readline())
-        return subprocess.CompletedProcess([module, *words], status, out.read(), err.read())
+    return _run({"module": module}, words, cwd, environment)
+
+
+def run_code(
+    code: str, *words: str, cwd: Path, environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Do what `python -c code words` does, and return what `subprocess.run` would."""
+    return _run({"code": code}, words, cwd, environment)
