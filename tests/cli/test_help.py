@@ -5,11 +5,10 @@ from __future__ import annotations
 import importlib
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.forks import run_module
 
 from stiffdice import __version__
 from stiffdice.cli import main as cli
@@ -78,11 +77,5 @@ def test_examples_name_what_is_there_and_options_that_are(command):
 def test_examples_run(command, tmp_path):
     (tmp_path / "config").symlink_to(ROOT / "config")
     for words in examples(command):
-        done = subprocess.run(
-            [sys.executable, "-m", "stiffdice.cli", *words[1:]],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = run_module("stiffdice.cli", *words[1:], cwd=tmp_path)
         assert done.returncode == 0, f"{shlex.join(words)}: {done.stderr}{done.stdout}"

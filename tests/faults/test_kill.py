@@ -1,6 +1,7 @@
 """kill -9 at any moment, of any part: the same command goes on, and ends with the bytes of an undisturbed run.
 
-STIFFDICE_KILLS says how many kills of the workflow there are: a dozen unless told, hundreds in the long mode.
+STIFFDICE_KILLS says how many kills of the workflow there are: some of each kind of part unless told, hundreds in the
+long mode.
 STIFFDICE_SEED repeats a sequence of kills; when they come still depends on the machine.
 """
 
@@ -22,7 +23,7 @@ import pytest
 from stiffdice.io import host
 from stiffdice.io.writer import write_bytes
 
-KILLS = int(os.environ.get("STIFFDICE_KILLS", "12"))
+KILLS = int(os.environ.get("STIFFDICE_KILLS", "8"))
 SEED = int(os.environ.get("STIFFDICE_SEED", str(time.time_ns() % 10**6)))
 A_LIFE = 8  # kills before a life may go on to its end
 STARTING = 2.0  # seconds until Snakemake starts its first job, about
@@ -35,6 +36,7 @@ class Killer:
         self._rng, self._names = rng, names
         self._pace = seconds / len(names)  # seconds a result, at most; measured anew whenever some were made
         self.kills = Counter()
+        self._killed = Counter()  # by kind alone: the rarest is next
 
     def live(self, project) -> None:
         last = self.kills.total() + A_LIFE
@@ -76,13 +78,15 @@ class Killer:
         return started.wait()
 
     def _kill(self, started: subprocess.Popen, by: str) -> str:
-        """Kill one part, or all at once, and see that what stands on it ends, too."""
+        """Kill one part, of a kind that was killed least, or all at once, and see that what stands on it ends, too."""
         top = psutil.Process(started.pid)
         everything = [top, *top.children(recursive=True)]
         parts = {"all": everything, by: [top]}
         for process in everything[1:]:
             parts[_kind(process)] = [process]
-        kind = str(self._rng.choice(sorted(parts)))
+        fewest = min(self._killed[part] for part in parts)
+        kind = str(self._rng.choice(sorted(part for part in parts if self._killed[part] == fewest)))
+        self._killed[kind] += 1
         for process in parts[kind]:
             _end(process)
         if kind not in ("job", "warm process") and sys.platform == "linux":
