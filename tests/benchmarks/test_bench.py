@@ -304,12 +304,6 @@ def test_help_and_imports_run():
 
 
 @pytest.mark.long
-def test_first_runs_at_once_agree():
-    (case,) = (case for case in cold.cases(QUICK) if case.name == "many_first_runs")
-    case.prepare()()
-
-
-@pytest.mark.long
 @pytest.mark.workflow
 def test_the_jobs_of_a_sweep_run(monkeypatch):
     monkeypatch.chdir(ROOT)

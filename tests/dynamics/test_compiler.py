@@ -226,7 +226,7 @@ print(float(run.trajectory.state["position"][-1, 2]).hex())
 
 @pytest.mark.long
 def test_what_one_process_compiles_another_waits_for(tmp_path):
-    """Two processes, each with a helper of its own, make each of the five kernels of a run once."""
+    """Two processes, each with a helper of its own, make each of the five kernels of a run once, and agree."""
     environment, saved = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "saved"
     command = [sys.executable, "-c", TOGETHER, str(saved)]
     started = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]

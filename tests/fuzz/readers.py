@@ -21,11 +21,15 @@ SCHEMA = TOP / "workflow" / "schemas" / "study.schema.yaml"
 
 
 class Reader(NamedTuple):
-    """samples: sound files. spoil: sample, others, seed → one that is not. attempt: reads it, in a folder."""
+    """samples: sound files. spoil: sample, others, seed → one that is not. attempt: reads it, in a folder.
+
+    before: called with some of the files that come next, and the folder.
+    """
 
     samples: list[bytes]
     spoil: Callable[[bytes, list[bytes], int], bytes]
     attempt: Callable[[bytes, bytes, Path], None]
+    before: Callable[[list[bytes], Path], None] = lambda _, __: None
 
 
 def one_line(error: InputError) -> None:
@@ -256,14 +260,27 @@ def damaged_files(folder: Path) -> Reader:
 
 def forged_files(folder: Path) -> Reader:
     """Files whose seal was renewed, in another process first: refused there, or all that reads them gets through."""
-    from stiffdice.io import seal
+    from stiffdice.io import isolation, seal
     from stiffdice.io.reader import open_file, parts
     from stiffdice.report import file_page
 
-    def attempt(data: bytes, _: bytes, folder: Path) -> None:
-        path = folder / "x.h5"
-        path.write_bytes(data + seal.line_of(data))
-        error = _tried(path)
+    places: dict[bytes, Path] = {}
+    errors: dict[str, InputError] = {}
+
+    def before(images: list[bytes], folder: Path) -> None:
+        """Try them in one other process, as far as none ends it."""
+        places.clear()
+        places.update((image, folder / f"{number}.h5") for number, image in enumerate(images))
+        for image, path in places.items():
+            path.write_bytes(image + seal.line_of(image))
+        errors.clear()
+        errors.update(isolation.refused(places.values()))
+
+    def attempt(data: bytes, _: bytes, __: Path) -> None:
+        path = places[data]
+        error = errors.get(str(path))
+        if error and "the HDF5 library fails" in str(error):  # or the child did
+            error = _tried(path)
         if error is not None:
             told(error, path)
             return
@@ -279,7 +296,7 @@ def forged_files(folder: Path) -> Reader:
         assert file_page.as_text(found, "x.h5")
         json.loads(file_page.as_json(found))
 
-    return Reader(list(_images(folder)), hdf5_blocks.changed, attempt)
+    return Reader(list(_images(folder)), hdf5_blocks.changed, attempt, before)
 
 
 def _tried(path: Path) -> InputError | None:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from tests.fuzz.readers import READERS
 
+AT_ONCE = 20  # cases that are made before they are tried
 SECONDS = 20  # of processor time, for one case
 MEMORY = 6 << 30  # bytes of addresses; numba and its threads reserve the most of it
 
@@ -27,13 +28,16 @@ def main(name: str, first: int, count: int) -> int:
     faulthandler.register(signal.SIGPROF, chain=True)
     failed = 0
     with tempfile.TemporaryDirectory() as place:
-        samples, spoil, attempt = READERS[name](Path(place))
+        samples, spoil, attempt, before = READERS[name](Path(place))
         for leftover in Path(place).iterdir():
             leftover.unlink()
         for seed in range(first, first + count):
+            if (seed - first) % AT_ONCE == 0:
+                ahead = range(seed, min(seed + AT_ONCE, first + count))
+                spoilt = [spoil(samples[k % len(samples)], samples, k) for k in ahead]
+                before(spoilt, Path(place))
             print(f"{name} {seed}", file=sys.stderr, flush=True)
-            sample = samples[seed % len(samples)]
-            data = spoil(sample, samples, seed)
+            sample, data = samples[seed % len(samples)], spoilt[(seed - first) % AT_ONCE]
             signal.setitimer(signal.ITIMER_PROF, SECONDS)
             try:
                 attempt(data, sample, Path(place))
