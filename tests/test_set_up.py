@@ -195,6 +195,7 @@ time.sleep(600)
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process uses")
 @pytest.mark.long
 def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
+    """Which exchanges an environment of an earlier version of stiffdice, too."""
     project, old, new = due
     before = project.venv.readlink().name
     user = project.start(project.venv.resolve() / "bin/python", "-c", USING)
@@ -206,8 +207,18 @@ def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
     user.kill()
     user.communicate()
     project.lock("requirements", wheel(project.folder / "wheels", "tiny", old))
+    as_earlier_versions_left_it(project)
     assert project.call()[0] == 0
+    assert (project.version("tiny"), project.version("engine"), project.venv.is_symlink()) == (old, "1.0", True)
     assert project.environments() == {project.venv.readlink().name}
+
+
+def as_earlier_versions_left_it(project: Project) -> None:
+    """Put a folder in the place of the link."""
+    folder = project.venv.resolve()
+    project.venv.unlink()
+    folder.rename(project.venv)
+    (project.venv / ".installed").write_text("")
 
 
 @pytest.mark.long
@@ -260,18 +271,6 @@ def test_of_two_set_ups_at_once_one_waits_for_what_the_other_started(due):
 
 def children(process: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
-
-
-@pytest.mark.long
-def test_an_environment_of_an_earlier_version_of_stiffdice_is_exchanged_too(due):
-    project, _, new = due
-    folder = project.venv.resolve()
-    project.venv.unlink()
-    folder.rename(project.venv)
-    (project.venv / ".installed").write_text("")
-    assert project.call()[0] == 0
-    assert (project.version("tiny"), project.version("engine"), project.venv.is_symlink()) == (new, "1.0", True)
-    assert project.environments() == {project.venv.readlink().name}
 
 
 @pytest.mark.parametrize("sign", [" ", "'", '"', "$", ";", "{", "}", "\n", "\t", "`", "&", "(", "\\", ":", "*"])
