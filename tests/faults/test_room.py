@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.faults.conftest import Project
 
 IN_NAMESPACE = ["unshare", "--mount", "sh", "-euc"]
 
@@ -128,25 +129,25 @@ def test_a_full_tmp_and_a_full_home_do_no_harm(undisturbed, tmp_path):
 
 @mounted
 @pytest.mark.long
-def test_nowhere_to_keep_compiled_kernels_is_one_line(undisturbed):
+def test_nowhere_to_keep_compiled_kernels_is_one_line(tmp_path):
     """Every place that Python would take for temporary files is read-only."""
     places = (
         "for place in / /tmp /var/tmp; do mount --bind $place $place; mount -o remount,bind,ro $place; done; cd /tmp;"
     )
-    command = (
-        f"{sys.executable} -m stiffdice.cli run {undisturbed.folder}/config/scenes/figure-09.yaml -o /dev/shm/out.h5"
-    )
-    done = shell(undisturbed, f"{places} {command}", HOME="/", TMPDIR="", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="")
+    project = Project.new(tmp_path / "project")
+    command = f"{sys.executable} -m stiffdice.cli run {project.folder}/config/scenes/figure-09.yaml -o /dev/shm/out.h5"
+    done = shell(project, f"{places} {command}", HOME="/", TMPDIR="", XDG_CACHE_HOME="", NUMBA_CACHE_DIR="")
     assert done.returncode == 2, done.stdout + done.stderr
     note, told = done.stderr.splitlines()
     assert note.startswith("stiffdice: note: 10,000 steps are beyond the limit")
     assert told.startswith("stiffdice: compiled kernels: neither /.cache nor a folder for temporary files can")
 
 
-def test_too_few_files_to_open_is_one_line(undisturbed):
-    command = ["sh", "-c", "ulimit -n 16; " + " ".join(undisturbed.command())]
+def test_too_few_files_to_open_is_one_line(tmp_path):
+    project = Project.new(tmp_path / "project")
+    command = ["sh", "-c", "ulimit -n 16; " + " ".join(project.command())]
     done = subprocess.run(
-        command, cwd=undisturbed.folder, env=undisturbed.environment, capture_output=True, text=True, check=False
+        command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
     )
     assert done.stderr == "stiffdice: 16 files may be open at a time (ulimit -n); 2 cores need 32\n"
     assert done.returncode == 2
@@ -191,15 +192,9 @@ for act in (lambda: write_dataset(whole, "out.h5"), spooled, lambda: open_file("
 """
 
 
-def test_no_file_to_open_is_one_line_and_nothing_is_stored(undisturbed, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", NO_MORE],
-        cwd=tmp_path,
-        env=undisturbed.environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def test_no_file_to_open_is_one_line_and_nothing_is_stored(tmp_path):
+    command = [sys.executable, "-c", NO_MORE]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
         "out.h5: Too many open files; nothing was stored",
