@@ -290,7 +290,7 @@ def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
 
     place = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
-    given = ("--model", "vertical", "-o", "out.h5")
+    given = ("--model", "vertical", "--steps", "20000", "-o", "out.h5")
     done = command("run", SCENE, *given, cwd=tmp_path, preexec_fn=tiny_files, env=place)
     assert done.returncode == 2
     assert re.fullmatch(r"(compiling .*\n)?stiffdice: .*File too large.*\n", done.stderr)
