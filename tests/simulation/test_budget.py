@@ -10,10 +10,9 @@ import time
 import numpy as np
 import pytest
 
-from stiffdice.advice.pilot import PATIENCE, SAMPLES, tried
+from stiffdice.advice.pilot import PATIENCE
 from stiffdice.advice.recommend import advise
 from stiffdice.cli.main import main
-from stiffdice.dynamics.model_selection import least_model
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
 from stiffdice.io.reader import open_file
@@ -114,15 +113,15 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
 @pytest.mark.long
 def test_advise_ends_soon_whatever_the_scene(kind, law):
     """With advice, for a part of the time at least, or by saying that it finds no path: by its patience, in seconds."""
-    share, scene = 0.1, extreme(kind, law)
-    tried(scene, least_model(scene, scene.duration / SAMPLES)[0], "event", SAMPLES, budget=1)  # compiles
-    begun = time.process_time()
-    try:
-        advice = advise(scene, 0.01, scheme="event", patience=round(share * PATIENCE))
-    except InputError as refused:
-        assert "no path" in str(refused)
-    else:
-        assert 0 < advice.horizon <= advice.duration
+    share = 0.1
+    for _ in range(2):  # the first compiles
+        begun = time.process_time()
+        try:
+            advice = advise(extreme(kind, law), 0.01, scheme="event", patience=round(share * PATIENCE))
+        except InputError as refused:
+            assert "no path" in str(refused)
+        else:
+            assert 0 < advice.horizon <= advice.duration
     assert time.process_time() - begun < 60 * share
 
 
