@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from stiffdice.cli import common
 from stiffdice.errors import InputError, printable
+from stiffdice.scene import validation
 
 if TYPE_CHECKING:
     from stiffdice.scene.scene import Scene
@@ -19,12 +20,14 @@ examples:
   stiffdice advise --side '16 mm' --mass '5 g' --restitution 0.5 --position '0,0,30 cm' --velocity 1,0,0 --error 0.1%
   stiffdice advise config/scenes/figure-09.yaml --error 1% --horizon 2 --run -o advised.h5
   stiffdice advise config/scenes/figure-09.yaml --scheme symplectic_euler --json
+  stiffdice advise config/scenes/die.yaml --for landing --error 0.003
 
 The error is the root mean square distance of the cube's centre from the exact path until the end (or the horizon), in
 radii of the cube: 1% of a 1 m cube is 1 cm. A path that is chaotic may be known for a part of the duration only; the
 advice is then for that part (docs/advice.md). It takes about ten seconds; the first on a machine compiles, which may
-take a minute. Where there is no SCENE.yaml, keys not given have the paper's values. Exit status: 0 for an advice, with
---run for a promise kept; 1 if nothing keeps the error or the promise is broken; 2 for bad input.
+take a minute. With --for landing the error is that of the faces' distribution, as total variation, and the advice is
+for `stiffdice throw` (docs/dice.md). Where there is no SCENE.yaml, keys not given have the paper's values. Exit status:
+0 for an advice, with --run for a promise kept; 1 if nothing keeps the error or the promise is broken; 2 for bad input.
 """
 
 # Keys of the scene that `advise` has an option for, and what they are.
@@ -43,6 +46,7 @@ _KEYS = {
     "spin": ("launch.angular_momentum", "angular momentum of the launch, as 0.1,0,0 [kg m²/s]"),
     "duration": ("duration", "of the run [s]"),
 }
+_PURPOSES = ("path", "landing")
 _VECTORS = ("position", "velocity", "spin")
 _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
@@ -53,6 +57,8 @@ def add(advise: argparse.ArgumentParser) -> None:
     advise.add_argument("scene", metavar="SCENE.yaml", nargs="?", help=told)
     told = "as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
     advise.add_argument("--error", default="1%", metavar="X", help=told)
+    told = "path, or landing: the faces of a die (default: path)"
+    advise.add_argument("--for", dest="purpose", default="path", metavar="WHAT", help=told)
     advise.add_argument("--horizon", metavar="T", help="until when to keep it [s] (default: the duration)")
     advise.add_argument("--scheme", metavar="NAME", help="advice for this scheme alone (default: all are compared)")
     told = "do it, and check the promise against a run of twice the cost and another method"
@@ -80,6 +86,18 @@ def _in_radii(text: str, scene: Scene) -> str:
         return text
 
 
+def _for_landing(options: argparse.Namespace, scene: Scene) -> int:
+    """Print how many steps the faces of a die need."""
+    given = {"--horizon": options.horizon, "--scheme": options.scheme, "-o": options.output}
+    if others := [name for name, value in given.items() if value is not None] + ["--run"] * options.run:
+        raise InputError(f"{others[0]}: is of a path; with --for landing allowed are --error and --json")
+    from stiffdice.advice import landing, recommend
+
+    found = landing.advise(scene, recommend.parsed_error(options.error))
+    print(found.as_json() if options.json else "\n".join([*scene.derived, *found.lines(scene.duration)]))
+    return 0
+
+
 def call(options: argparse.Namespace) -> int:
     """Print the advice; 1 if there is none, or its promise is not kept."""
     from stiffdice.io import seal
@@ -90,6 +108,8 @@ def call(options: argparse.Namespace) -> int:
     changes += options.overrides
     file, preset = options.scene, options.preset
     scene = scenes.load(file, changes, preset) if file is not None else scenes.changed({}, changes, preset)
+    if validation.choice("--for", options.purpose, _PURPOSES) == "landing":
+        return _for_landing(options, scene)
     horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
     target = None
     if options.output is not None:

@@ -1,0 +1,67 @@
+"""Steps for the faces of a die: as coarse as the distribution of faces allows, whatever becomes of the paths."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+from stiffdice.errors import InputError
+from stiffdice.experiments.dice.coarse_steps import steps_at
+from stiffdice.integrators import linear_stability
+from stiffdice.scene import validation
+from stiffdice.scene.scene import Scene
+from stiffdice.simulation.landing import BATCHED, MODEL, faces_of
+
+# By total variation: the ωh of the fastest contact up to which `make landing` found the faces' distribution within it,
+# with a margin (docs/dice.md).
+LONGEST = {0.003: 0.9, 0.001: 0.3}
+
+
+@dataclass(frozen=True)
+class LandingAdvice:
+    """Steps that keep the distribution of faces.
+
+    error [1]: total variation to that of short steps. steps: to the scene's duration. omega_h [1]: of the fastest
+    contact. contact: which that is.
+    """
+
+    error: float
+    scheme: str
+    steps: int
+    omega_h: float
+    contact: str
+
+    def as_json(self) -> str:
+        """Return it as JSON."""
+        return json.dumps(asdict(self), indent=2)
+
+    def lines(self, duration: float) -> list[str]:
+        """Return what to tell of it."""
+        return [
+            f"scheme    {self.scheme}",
+            f"steps     {self.steps} to {duration:g} s, at most: a throw ends as soon as its face is decided",
+            f"error     at most {self.error:g} of total variation of the faces' distribution; single paths are lost",
+            f"evidence  ωh = {self.omega_h:.2g} of the fastest contact ({self.contact}); docs/dice.md has the scan",
+        ]
+
+
+def advise(scene: Scene, error: float) -> LandingAdvice:
+    """Return the steps at which the distribution of a die's faces is within a total variation [1].
+
+    Raises InputError for an error below what was measured, and for ground on which nothing comes to rest.
+    """
+    asked = validation.number("error", error, "1", above=0)
+    fitting = [bound for bound in LONGEST if bound <= asked]
+    if not fitting:
+        raise InputError(
+            f"error = {asked:g}: allowed for a landing is a total variation of {min(LONGEST):g} or more [1]"
+        )
+    faces_of(scene)
+    bound = max(fitting)
+    hardest = linear_stability.hardest(scene, MODEL)
+    if hardest.omega == 0:
+        raise InputError(
+            f"ground.stiffness = {scene.ground.stiffness:g}: a die comes to rest on ground above 0 [kg/s²]"
+        )
+    steps = steps_at(scene, LONGEST[bound])
+    return LandingAdvice(bound, BATCHED, steps, hardest.omega * scene.duration / steps, hardest.mode)
