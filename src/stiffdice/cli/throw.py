@@ -5,12 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiffdice.cli import common
 from stiffdice.errors import InputError
 
+if TYPE_CHECKING:
+    from stiffdice.experiments.dice.throws import Thrown
+
 _DPI = 120
+# Shown of a throw after it is decided [s].
+_AFTER = 0.3
 
 HELP = "throw a die: which face is up, and how often each is in many throws"
 EXAMPLES = """\
@@ -72,7 +77,7 @@ def call(options: argparse.Namespace) -> None:
         thrown = throws.one(scene, launches, options.scheme, steps)
         _show(options, throws.told_of_one(thrown), thrown.as_mapping())
         if options.animate is not None:
-            _animate(thrown.run, Path(options.animate), f"A die thrown: {thrown.face} is up")
+            _animate(thrown, Path(options.animate))
         return
     from stiffdice.cli.progress import progress
 
@@ -85,11 +90,14 @@ def _show(options: argparse.Namespace, lines: list[str], mapping: dict[str, Any]
     print(json.dumps(mapping, indent=2) if options.json else "\n".join(lines))
 
 
-def _animate(run: Any, target: Path, title: str) -> None:
-    """Draw a run as it goes."""
+def _animate(thrown: Thrown, target: Path) -> None:
+    """Draw a throw as it goes, until it is decided and a little longer."""
     from stiffdice.io.writer import check_target
     from stiffdice.report.figures import registry
     from stiffdice.simulation.dataset import run_dataset
 
     check_target(target)
-    registry.draw("animation", {"throw": run_dataset(run)}, title, _DPI, [str(target)])
+    shown = run_dataset(thrown.run)
+    if thrown.time is not None:
+        shown = shown.sel(time=slice(0, thrown.time + _AFTER))
+    registry.draw("die-animation", {"throw": shown}, f"A die thrown: {thrown.face} is up", _DPI, [str(target)])

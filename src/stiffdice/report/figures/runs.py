@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
@@ -15,8 +16,21 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from stiffdice.report.figures import style
 from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
 from stiffdice.report.number_format import describe, scene_of
-from stiffdice.scene.cube import LINKS
+from stiffdice.scene import die
+from stiffdice.scene.cube import LINKS, SIGNS
 
+# Where the viewer stands [degrees].
+_ELEVATION, _AZIMUTH = 18, -70
+# By face, its pips on a square from −1 to 1.
+_CORNERS = ((-1, -1), (1, 1), (-1, 1), (1, -1))
+_PIPS: dict[int, tuple[tuple[int, int], ...]] = {
+    1: ((0, 0),),
+    2: _CORNERS[:2],
+    3: ((0, 0), *_CORNERS[:2]),
+    4: _CORNERS,
+    5: ((0, 0), *_CORNERS),
+    6: (*_CORNERS, (-1, 0), (1, 0)),
+}
 # Seconds that an animation of a short run lasts.
 _SHORTEST_ANIMATION = 6.0
 
@@ -33,10 +47,10 @@ def _at(runs: Mapping[str, xr.Dataset], title: str, moment: float) -> Figure:
 start, middle, end = (partial(_at, moment=moment) for moment in (0.0, 0.5, 1.0))
 
 
-def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
+def animation(runs: Mapping[str, xr.Dataset], title: str, *, pips: bool = False) -> Animation:
     """Return the whole run, in real time unless it would be over in less than some seconds."""
     run = next(iter(runs.values()))
-    figure, show = _stage(run, title)
+    figure, show = _stage(run, title, pips)
     clock = figure.text(0.99, 0.97, "", ha="right", va="top")
     duration = float(run.time[-1])
     slower = max(1, math.ceil(_SHORTEST_ANIMATION / duration)) if duration < _SHORTEST_ANIMATION / 2 else 1
@@ -52,7 +66,10 @@ def animation(runs: Mapping[str, xr.Dataset], title: str) -> Animation:
     return Animation(figure, frame, count)
 
 
-def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[Any]]]:
+die_animation = partial(animation, pips=True)
+
+
+def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Callable[[int], list[Any]]]:
     """Return a figure with the ground in 3-D axes, equal in scale, and a function that shows the cube at a sample."""
     figure = style.new_figure(title, height=3.2)
     figure.set_layout_engine("none")
@@ -66,8 +83,9 @@ def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[An
     middle = (low[1] + high[1]) / 2
     low[1], high[1] = min(low[1], middle - 3 * unit), max(high[1], middle + 3 * unit)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
-    axes.set_box_aspect((high[0] - low[0], high[1] - low[1], high[2]), zoom=1.25)
-    axes.view_init(elev=18, azim=-70)
+    long = high[0] - low[0] > 4 * (high[1] - low[1])
+    axes.set_box_aspect((high[0] - low[0], high[1] - low[1], high[2]), zoom=1.25 if long else 1.0)
+    axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     # The plane n·x = 0 under the run, with a grid of two units.
     nx, ny, nz = scene_of(run)["ground"]["normal"]
     if nz != 0:  # a wall has no height over x and y
@@ -84,20 +102,51 @@ def _stage(run: xr.Dataset, title: str) -> tuple[Figure, Callable[[int], list[An
     axes.set_xlabel("x [m]", labelpad=10)
     axes.set_ylabel("y [m]", labelpad=2)
     axes.set_zlabel("z [m]", labelpad=-6)
-    axes.set_yticks(np.arange(np.ceil(low[1] / 2 / unit) * 2 * unit, high[1] + unit, 2 * unit))
-    axes.set_zticks([0, 2 * unit, 4 * unit])
+    wide = 2 * unit if high[1] - low[1] < 10 * unit else 5 * unit
+    axes.set_yticks(np.arange(np.ceil(low[1] / wide) * wide, high[1] + unit / 2, wide))
+    axes.set_zticks([0, 2 * unit, 4 * unit] if high[2] < 8 * unit else np.arange(0, high[2] + unit / 2, 5 * unit))
     axes.tick_params(labelsize=7.5, pad=-1)
     places, nodes = run.position.values, run.position.values[:, None] + run.node_offset.values
     look = {"colors": style.BLUE, "linewidths": 1.3, "zorder": 4, "clip_on": False}
     edges = axes.add_collection3d(Line3DCollection(np.zeros((1, 2, 3)), **look))
+    (dots,) = axes.plot(*places[:1].T, color=style.INK, marker="o", markersize=1.4, linestyle="none", zorder=5)
+    dots.set_visible(pips)
     (trace,) = axes.plot(*places[:1].T, color=style.QUIET, linewidth=0.8, zorder=3, clip_on=False)
 
     def show(sample: int) -> list[Any]:
-        edges.set_segments(nodes[sample][np.array(LINKS)])
+        seen = _faces_in_sight(nodes[sample])
+        links = [link for link in LINKS if not pips or any(_on(face, *link) for face in seen)]
+        edges.set_segments(nodes[sample][np.array(links)])
         trace.set_data_3d(*places[: sample + 1].T)
-        return [edges, trace]
+        dots.set_data_3d(*_pips_on(seen, nodes[sample]).T)
+        return [edges, trace, dots]
 
     return figure, show
+
+
+def _faces_in_sight(nodes: npt.NDArray[np.float64]) -> list[int]:
+    """Return the faces that the viewer sees of a box with these nodes, shape (8, 3)."""
+    edges = SIGNS.T @ nodes
+    elevation, azimuth = np.radians((_ELEVATION, _AZIMUTH))
+    towards = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
+    facing = die.NORMALS @ edges @ towards
+    return [face for face, sign in zip(die.FACES, facing, strict=True) if sign > 0]
+
+
+def _on(face: int, *nodes: int) -> bool:
+    """Return whether all of these nodes are on a face."""
+    return bool((SIGNS[list(nodes)] @ die.NORMALS[face - 1] > 0).all())
+
+
+def _pips_on(faces: Sequence[int], nodes: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return where the pips of some faces are, shape (pip, 3), on a box with these nodes, shape (8, 3)."""
+    edges, centre, found = SIGNS.T @ nodes / len(SIGNS), nodes.mean(axis=0), []
+    for face in faces:
+        normal = die.NORMALS[face - 1]
+        axis = int(np.abs(normal).argmax())
+        across, along = edges[(axis + 1) % 3] / 2, edges[(axis + 2) % 3] / 2
+        found += [centre + normal @ edges + u * across + v * along for u, v in _PIPS[face]]
+    return np.array(found)
 
 
 def position(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
