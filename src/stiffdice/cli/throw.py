@@ -93,11 +93,11 @@ def _show(options: argparse.Namespace, lines: list[str], mapping: dict[str, Any]
 def _animate(thrown: Thrown, target: Path) -> None:
     """Draw a throw as it goes, until it is decided and a little longer."""
     from stiffdice.io.writer import check_target
-    from stiffdice.report.figures import registry
+    from stiffdice.report.figures import registry, runs
     from stiffdice.simulation.dataset import run_dataset
 
     check_target(target)
     shown = run_dataset(thrown.run)
     if thrown.time is not None:
         shown = shown.sel(time=slice(0, thrown.time + _AFTER))
-    registry.draw("die-animation", {"throw": shown}, f"A die thrown: {thrown.face} is up", _DPI, [str(target)])
+    registry.store(runs.die_animation, {"throw": shown}, f"A die thrown: {thrown.face} is up", _DPI, [str(target)])

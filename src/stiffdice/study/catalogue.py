@@ -38,7 +38,6 @@ DRAWINGS: dict[str, Entry] = {
     "cube-middle": Entry("stiffdice.report.figures.runs", "middle", "runs"),
     "cube-end": Entry("stiffdice.report.figures.runs", "end", "runs"),
     "animation": Entry("stiffdice.report.figures.runs", "animation", "runs"),
-    "die-animation": Entry("stiffdice.report.figures.runs", "die_animation", "runs"),
     "position": Entry("stiffdice.report.figures.runs", "position", "runs"),
     "energy": Entry("stiffdice.report.figures.runs", "energy", "runs"),
     "frontier": Entry("stiffdice.report.figures.stability", "steps_needed", "sweeps"),

@@ -10,6 +10,7 @@ from tests.report.figures.drawing import check_equal_files, check_units, drawn, 
 
 from stiffdice.report.figures import registry as figures
 from stiffdice.report.figures import runs, style
+from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.dataset import run_dataset
 from stiffdice.simulation.run import simulate
@@ -71,6 +72,20 @@ def test_the_animation_shows_the_cube_where_it_is(data):
     corners = np.asarray(edges._segments3d).reshape(-1, 3)
     centre = run.position.values[-1]
     np.testing.assert_allclose(corners.mean(axis=0), centre, atol=1e-12)
+
+
+def test_a_die_shows_the_pips_of_the_faces_in_sight_and_no_hidden_edge(data):
+    run = {"throw": data["cube"]["as_listed"].isel(time=slice(0, 3))}
+    with style.applied():
+        animation = runs.die_animation(run, "A die")
+        edges, _, dots, clock = animation.show(0)
+    assert "slowed down" in clock.get_text()
+    assert len(edges._segments3d) in (4, 7, 9)  # of one face, two or three
+    places = np.stack(dots.get_data_3d(), axis=1) - run["throw"].position.values[0]
+    half = run["throw"].node_offset.values[0].T @ SIGNS / 8
+    along = places @ np.linalg.inv(half).T
+    np.testing.assert_allclose(np.abs(along).max(axis=1), 1, atol=1e-9)  # each on a face
+    assert len(along) in (6, 7, 9, 10, 11, 14, 15) or len(along) <= 6
 
 
 def test_the_cube_is_drawn_turned_as_it_is(data):

@@ -37,8 +37,15 @@ def draw(drawing: str, data: Mapping[str, xr.Dataset], title: str, dpi: int, pat
 
     data: runs by preset, or what sweeps and experiments found, by name. Raises OutputError if a file cannot be stored.
     """
+    store(DRAWINGS[drawing].load(), data, title, dpi, paths)
+
+
+def store(
+    drawing: Callable[..., Figure | Animation], data: Mapping[str, xr.Dataset], title: str, dpi: int, paths: list[str]
+) -> None:
+    """Draw by a function as `draw` does by a name."""
     with style.applied():
-        figure = DRAWINGS[drawing].load()(data, title)
+        figure = drawing(data, title)
         for path in paths:
             stream = io.BytesIO()
             if isinstance(figure, Animation):

@@ -53,7 +53,7 @@ def animation(runs: Mapping[str, xr.Dataset], title: str, *, pips: bool = False)
     figure, show = _stage(run, title, pips)
     clock = figure.text(0.99, 0.97, "", ha="right", va="top")
     duration = float(run.time[-1])
-    slower = max(1, math.ceil(_SHORTEST_ANIMATION / duration)) if duration < _SHORTEST_ANIMATION / 2 else 1
+    slower = max(1, math.ceil(_SHORTEST_ANIMATION / duration)) if duration < _SHORTEST_ANIMATION / 4 else 1
     digits = 1 if slower == 1 else 3
     told = "" if slower == 1 else f", slowed down {slower} times"
     count = max(2, round(slower * duration * FRAMES_PER_SECOND))
@@ -119,7 +119,7 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
         edges.set_segments(nodes[sample][np.array(links)])
         trace.set_data_3d(*places[: sample + 1].T)
         dots.set_data_3d(*_pips_on(seen, nodes[sample]).T)
-        return [edges, trace, dots]
+        return [edges, trace, *([dots] if pips else [])]
 
     return figure, show
 
