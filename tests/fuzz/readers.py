@@ -299,19 +299,50 @@ def forged_files(folder: Path) -> Reader:
     return Reader(list(_images(folder)), hdf5_blocks.changed, attempt, before)
 
 
-def _tried(path: Path) -> InputError | None:
+def tosses(folder: Path) -> Reader:
+    """Files of measured tosses, in another process first: refused there, or read as tosses that are whole."""
+    import numpy as np
+    from tests import toss_files
+
+    from stiffdice.scene import tosses as files
+
+    def attempt(data: bytes, _: bytes, folder: Path) -> None:
+        path = folder / "x.h5"
+        path.write_bytes(data)
+        error = _tried(path, files.__name__)
+        try:
+            if error is not None:
+                raise error
+            found = files.load(path)
+        except InputError as refusal:
+            told(refusal, path)
+            return
+        assert found.counts.sum() == len(found.position) == len(found.orientation)
+        assert all(np.isfinite(part).all() for part in found)
+
+    few = [toss_files.stored(toss_files.some(count), folder / f"{count}.h5").read_bytes() for count in (1, 2)]
+    return Reader([*few, toss_files.REAL.read_bytes()], _changed_or_cut, attempt)
+
+
+def _changed_or_cut(sample: bytes, samples: list[bytes], seed: int) -> bytes:
+    """Return a file changed in its structure, or anywhere."""
+    spoil = hdf5_blocks.changed if seed % 4 and hdf5_blocks.blocks(sample) else mutations.bytes_of
+    return spoil(sample, samples, seed)
+
+
+def _tried(path: Path, module: str = "") -> InputError | None:
     from stiffdice.io import isolation
 
     honest, states = isolation.tried, []
 
-    def watched(paths: list[str]) -> Any:
-        answers, status = honest(paths)
+    def watched(paths: list[str], module: str) -> Any:
+        answers, status = honest(paths, module)
         states.append(status)
         return answers, status
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(isolation, "tried", watched)
-        error = isolation.refused([path]).get(str(path))
+        error = isolation.refused([path], module or isolation.OURS).get(str(path))
     assert states != [1], "the child itself failed, and not the library"
     return error
 
@@ -325,4 +356,5 @@ READERS = {
     "crate": lambda _: crates(),
     "damaged": damaged_files,
     "forged": forged_files,
+    "tosses": tosses,
 }

@@ -26,6 +26,7 @@ CASES = {
     "crate": 200,
     "damaged": 100,
     "forged": 100,
+    "tosses": 60,
 }
 
 

@@ -103,14 +103,12 @@ def check(file: h5py.File, length: int) -> Contents:
     """Return what an open file of so many bytes holds; raises RefusedError naming the variable if it is not ours."""
     about = _attributes("the file", file)
     _check_scene(about)
-    datasets = dict(_datasets(file))
+    datasets = dict(plain_datasets(file))
     owns = {name: _attributes(name, dataset) for name, dataset in datasets.items()}
     scales = {name for name, own in owns.items() if own.get("CLASS") == "DIMENSION_SCALE"}
     names = [name for name in datasets if name not in scales or _BARE not in str(owns[name].get("NAME"))]
     sizes = {name: math.prod(datasets[name].shape) * datasets[name].dtype.itemsize for name in names}
-    total, most = sum(sizes.values()), max(ALWAYS_ALLOWED, MOST_RATIO * length)
-    told = f"holds {total / 1e6:.4g} MB in a file of {length / 1e6:.4g} MB: allowed are {most / 1e6:.4g} MB"
-    _demand(total <= most, told)
+    check_size(sum(sizes.values()), length)
     dimensions = _dimensions(file, datasets, scales)
     listed = scales.union(*(str(own.get("coordinates", "")).split() for own in (about, *owns.values())))
     variables = {}
@@ -120,7 +118,14 @@ def check(file: h5py.File, length: int) -> Contents:
     return Contents(_public(about), variables)
 
 
-def _datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
+def check_size(total: int, length: int) -> None:
+    """Raise RefusedError for values of more bytes in memory than a file of so many should hold."""
+    most = max(ALWAYS_ALLOWED, MOST_RATIO * length)
+    told = f"holds {total / 1e6:.4g} MB in a file of {length / 1e6:.4g} MB: allowed are {most / 1e6:.4g} MB"
+    _demand(total <= most, told)
+
+
+def plain_datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
     """Yield everything in a file with its name; raises RefusedError at what is not plain numbers stored in it."""
     for raw in file.id:
         name = raw.decode("utf-8", "replace")
@@ -245,13 +250,19 @@ def shown(text: object) -> str:
 def opened(path: str | Path) -> Iterator[tuple[h5py.File, Contents]]:
     """Give a file of ours and what it holds; raises InputError, not naming the file, if it cannot be trusted."""
     place = Path(path)
-    about = place.stat()
-    if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
-        raise InputError("is not a regular file")  # a pipe would be waited for
+    length = length_of(place)
     sealed = seal.check(place)
     with h5py.File(place, "r") as file:
         check_version(file, sealed)
-        yield file, check(file, about.st_size)
+        yield file, check(file, length)
+
+
+def length_of(path: Path) -> int:
+    """Return the bytes of a file; raises InputError, not naming it, for a pipe, which would be waited for."""
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
+        raise InputError("is not a regular file")
+    return about.st_size
 
 
 @contextmanager

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stiffdice.dynamics.state import Array, States, matrices, start_of, turned_tensor
+from stiffdice.dynamics.state import Array, States, start_of, turned_tensor
 from stiffdice.errors import InputError
 from stiffdice.scene import validation
+from stiffdice.scene.rotation import matrices
 from stiffdice.scene.scene import RandomSpin, Scene
 
 # Launches drawn by one generator: the k-th launch of a seed is the same however many are drawn.

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from stiffdice.dynamics.models.registry import MODELS
-from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, matrices, physics_of, start_of
+from stiffdice.dynamics.state import TOUCHING, TURNING, Array, States, physics_of, start_of
 from stiffdice.integrators import registry as schemes
-from stiffdice.scene.rotation import along
+from stiffdice.scene.rotation import along, matrices
 from stiffdice.scene.scene import Scene
 
 

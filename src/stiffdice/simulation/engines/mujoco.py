@@ -27,7 +27,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from stiffdice.dynamics.state import TOUCHING, Array, States, matrices
+from stiffdice.dynamics.state import TOUCHING, Array, States
+from stiffdice.scene.rotation import matrices
 from stiffdice.simulation.engines.adapter import RigidBody
 
 _IMPEDANCE = 1e-4  # mjMINIMP
