@@ -1,0 +1,1 @@
+"""Measured tosses of a real cube, and the simulator beside them."""
