@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -45,6 +45,9 @@ landing: install  ## how often each face of a die is up, and how coarse steps ma
 
 engines: install  ## the engines that are installed beside stiffdice, into results/engines/
 	@$(RUN) engines
+
+tosses: install  ## real tosses of a cube, and the simulation beside them, into results/tosses/
+	@$(RUN) tosses
 
 study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(RUN) study --config 'study=$(STUDY)'

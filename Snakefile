@@ -7,6 +7,7 @@
 #   snakemake refinement                  whether fewer runs, put where members disagree, say as much
 #   snakemake landing                     how often each face of a die is up, and how coarse steps may be for that
 #   snakemake engines                     other engines beside stiffdice, as far as they are installed
+#   snakemake tosses                      real tosses of a cube, and the simulation beside them
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -67,6 +68,11 @@ rule refinement:
 rule landing:
     input:
         lambda wildcards: everything_of("landing"),
+
+
+rule tosses:
+    input:
+        lambda wildcards: everything_of("tosses"),
 
 
 rule engines:

@@ -138,7 +138,7 @@ def shown_by(stage, entries):
 
     def files(wildcards):
         draw = planned(stage)(wildcards).draw
-        _, parts = needs_of(wildcards.study)["animation" if draw == "animation" else stage, wildcards[stage]]
+        _, parts = needs_of(wildcards.study)["animation" if draw.endswith("animation") else stage, wildcards[stage]]
         found = {}
         for part in parts:
             name = part.name.partition(".")[2] if part.stage == "trajectory" else part.name

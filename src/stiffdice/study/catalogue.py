@@ -31,6 +31,7 @@ class Entry(NamedTuple):
 
 
 _COMPARED, _TOLD = "stiffdice.report.figures.methods", "stiffdice.report.tables.methods"
+_TOSSES, _TOSSES_TOLD = "stiffdice.report.figures.tosses", "stiffdice.report.tables.tosses"
 
 # (datasets by name, title) -> a figure.
 DRAWINGS: dict[str, Entry] = {
@@ -52,6 +53,11 @@ DRAWINGS: dict[str, Entry] = {
     "friction-chatter": Entry("stiffdice.report.figures.resting", "chatter", "experiments", "friction-chatter"),
     "model-ablation": Entry("stiffdice.report.figures.model_ablation", "draw", "experiments", "model-ablation"),
     "held-contacts": Entry("stiffdice.report.figures.resting", "held_contacts", "experiments", "held-contacts"),
+    "toss-steps": Entry(_TOSSES, "steps", "experiments", "toss-steps"),
+    "toss-time": Entry(_TOSSES, "over_time", "experiments", "toss-models"),
+    "toss-fit": Entry(_TOSSES, "fit", "experiments", "toss-fit"),
+    "toss-chaos": Entry(_TOSSES, "chaos", "experiments", "toss-chaos"),
+    "toss-animation": Entry(_TOSSES, "animation", "experiments", "toss"),
     "work-precision": Entry(_COMPARED, "position", "experiments", "work-precision", timed=True),
     "work-restitution": Entry(_COMPARED, "restitution", "experiments", "work-precision", timed=True),
     "work-energy": Entry(_COMPARED, "energy", "experiments", "work-precision", timed=True),
@@ -75,6 +81,10 @@ TABLES: dict[str, Entry] = {
     "engine-contact": Entry(_TOLD, "engine_contact", "experiments", "engine-contact"),
     "engine-limits": Entry(_TOLD, "engine_limits", "experiments", "engine-limits"),
     "engine-speed": Entry(_TOLD, "engine_speed", "timings", "engine-speed"),
+    "toss-fit": Entry(_TOSSES_TOLD, "fit", "experiments", "toss-fit"),
+    "toss-models": Entry(_TOSSES_TOLD, "models", "experiments", "toss-models"),
+    "toss-steps": Entry(_TOSSES_TOLD, "steps", "experiments", "toss-steps"),
+    "toss-chaos": Entry(_TOSSES_TOLD, "chaos", "experiments", "toss-chaos"),
     "targets": Entry(_TOLD, "targets", "experiments", "work-precision", timed=True),
 }
 
@@ -92,6 +102,11 @@ EXPERIMENTS: dict[str, Entry] = {
     "landing": Entry("stiffdice.experiments.dice.landing", "measure", on_its_ground=True),
     "coarse-steps": Entry("stiffdice.experiments.dice.coarse_steps", "measure", on_its_ground=True),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
+    "toss": Entry("stiffdice.experiments.tosses.single", "measure"),
+    "toss-fit": Entry("stiffdice.experiments.tosses.fit", "measure"),
+    "toss-models": Entry("stiffdice.experiments.tosses.models", "measure"),
+    "toss-steps": Entry("stiffdice.experiments.tosses.steps", "measure"),
+    "toss-chaos": Entry("stiffdice.experiments.tosses.chaos", "measure"),
     "engine-contact": Entry("stiffdice.experiments.engines", "contact"),
     "engine-limits": Entry("stiffdice.experiments.engines", "limits"),
     "engine-throw": Entry("stiffdice.experiments.engines", "throw"),

@@ -42,6 +42,7 @@ _EXPERIMENT = {
     **{"landing": 60.0, "coarse-steps": 300.0},
     **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},
     **{"flat-bounce": 25.0, "sliding-bounce": 21.0, "tumbling-throw": 75.0},
+    **{"toss": 0.1, "toss-fit": 95.0, "toss-models": 3.5, "toss-steps": 92.0, "toss-chaos": 34.0},
 }
 _TIMING = {
     **{"work-precision": 3.0, "model-ablation": 1.2, "engine-speed": 3.2},

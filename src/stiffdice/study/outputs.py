@@ -104,7 +104,7 @@ def _made(study: Study) -> Iterator[tuple[Result, Sequence[Key]]]:
     for name, sweep in study.sweeps.items():
         yield from _swept(f"sweeps/{name}", name, sweep)
     for name, figure in study.figures.items():
-        stage, kinds = ("animation", ["gif"]) if figure.draw == "animation" else ("figure", ["svg", "png"])
+        stage, kinds = ("animation", ["gif"]) if figure.draw.endswith("animation") else ("figure", ["svg", "png"])
         files = tuple(f"figures/{name}.{kind}" for kind in kinds)
         yield Result(stage, name, files), _shown_by(study, figure, DRAWINGS[figure.draw].given)
     for name, table in study.tables.items():
@@ -209,6 +209,8 @@ def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
             plans, entries = (study.timings, TIMINGS) if timed else (study.experiments, EXPERIMENTS)
             part = plans[name]
             plan = [part.measure, part.options, engines.attributes(part.options.get("methods", ()))]
+            if "data" in part.options:
+                plan.append(_content(root / part.options["data"]))
             return scenes.load(root / part.scene, part.changes).digest, plan, entries[part.measure].module
         case "figure" | "animation":
             return "-", [study.figures[name], [study.dpi]], DRAWINGS[study.figures[name].draw].module
@@ -220,6 +222,11 @@ def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
         return sweep.scene.digest, plan, *backend.code_of(sweep.simulator)
     # All of a frontier follows from its sweep.
     return sweep.scene.digest, None if result.stage == "frontier" else [sweep.config, dict(sweep.criteria)]
+
+
+def _content(path: Path) -> str:
+    """Return the digest of a file of measurements; of one that is not there, nothing."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 def _code(root: Path, stage: str, *modules: str) -> str:
