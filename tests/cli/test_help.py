@@ -14,7 +14,7 @@ from stiffdice import __version__
 from stiffdice.cli import main as cli
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ["", "run", "advise", "throw", "inspect", "diff", "status", "archive", "verify", "rebuild"]
+COMMANDS = ["", "run", "advise", "throw", "tosses", "inspect", "diff", "status", "archive", "verify", "rebuild"]
 
 
 def examples(command: str) -> list[list[str]]:
@@ -27,7 +27,7 @@ def examples(command: str) -> list[list[str]]:
 
 def made_by(words: list[str]) -> set[str]:
     """Return the files and folders that a line leaves."""
-    made = {words[k + 1] for k, word in enumerate(words) if word in ("-o", "--output")}
+    made = {words[k + 1] for k, word in enumerate(words) if word in ("-o", "--output", "--animate")}
     if words[0] == "cp":
         made.add(words[-1])
     if words[0] == "make":

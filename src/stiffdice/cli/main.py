@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, archive, diff, inspect, rebuild, run, status, throw, verify
+from stiffdice.cli import advise, archive, diff, inspect, rebuild, run, status, throw, tosses, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
 
@@ -23,6 +23,7 @@ examples:
   stiffdice run config/scenes/figure-04.yaml --model auto -o throw.h5
   stiffdice advise config/scenes/figure-04.yaml --error 1%
   stiffdice throw --count 100000
+  stiffdice tosses --data config/measurements/tosses.h5
   stiffdice inspect stiff.h5
   stiffdice diff stiff.h5 softer.h5
   make archive STUDY=quick
@@ -60,7 +61,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in (run, advise, throw, inspect, diff, status, archive, verify, rebuild):
+    for module in (run, advise, throw, tosses, inspect, diff, status, archive, verify, rebuild):
         command = commands.add_parser(
             module.__name__.rpartition(".")[2],
             help=module.HELP,
