@@ -48,6 +48,8 @@ PAGES = [
     "docs/scale.md",
     "docs/cost.md",
     "docs/refinement.md",
+    "docs/dice.md",
+    "docs/tosses.md",
     "CHANGELOG.md",
 ]
 
