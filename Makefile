@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses shapes study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -48,6 +48,9 @@ engines: install  ## the engines that are installed beside stiffdice, into resul
 
 tosses: install  ## real tosses of a cube, and the simulation beside them, into results/tosses/
 	@$(RUN) tosses
+
+shapes: install  ## which face of a box comes up by shape and load, into results/shapes/
+	@$(RUN) shapes
 
 study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(RUN) study --config 'study=$(STUDY)'

@@ -8,6 +8,7 @@
 #   snakemake landing                     how often each face of a die is up, and how coarse steps may be for that
 #   snakemake engines                     other engines beside stiffdice, as far as they are installed
 #   snakemake tosses                      real tosses of a cube, and the simulation beside them
+#   snakemake shapes                      which face of a box comes up, by shape and load
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -78,6 +79,11 @@ rule tosses:
 rule engines:
     input:
         lambda wildcards: everything_of("engines"),
+
+
+rule shapes:
+    input:
+        lambda wildcards: everything_of("shapes"),
 
 
 rule study:

@@ -36,6 +36,7 @@ def made(project, *names):
         ("extremes", "failure-map.svg (Where and how runs fail"),
         ("tradeoff", "evaluations-position.svg (Error of the position against force evaluations)"),
         ("refinement", "refinement.svg (A cube that slides: the dense grid's answer"),
+        ("shapes", "ends.svg (How often a square box (a, a, c) lands on one of its ends"),
         ("engines", "limits.svg (One flat bounce with longer and longer steps"),
     ],
 )

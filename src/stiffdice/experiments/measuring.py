@@ -25,9 +25,11 @@ Variable = tuple[str | Sequence[str], Any, dict[str, Any]]
 _KNOWN = dataset.CELL_ATTRIBUTES | {"axis": dataset.AXIS_ATTRIBUTES}
 # Meaning and unit of the others, where the name does not say it; one whose values are words is an enum.
 _COORDINATES = {
+    "aspect": ("length of a square box over its width, c/a", "1"),
     "approximation": ("model without rotation: with friction, and without", "1"),
     "bounce": ("number of the bounce", "1"),
     "bound": ("bound of the floor", "1"),
+    "check": ("what was changed of how the coefficients are measured", "1"),
     "damping": ("ground damping", "kg s-1"),
     "duration": ("duration of the runs", "s"),
     "face": ("pips of the face", "1"),
@@ -45,8 +47,12 @@ _COORDINATES = {
     "piece": ("piece of the full model that the scene does not need", "1"),
     "quantile": ("quantile over the throws", "1"),
     "rest": ("how a throw ended", "1"),
+    "restitution": ("speed up over speed down of a flat landing", "1"),
     "role": ("model with the piece, or without", "1"),
     "source": ("reference", "1"),
+    "specimen": ("number of the measured box", "1"),
+    "speed": ("mean speed of the launch along the ground", "m s-1"),
+    "spin": ("standard deviation of each component of the launch's angular velocity", "rad s-1"),
     "step_size": ("step size", "s"),
     "time": ("time since the launch", "s"),
     "tolerance": ("tolerance of the scheme event", "1"),

@@ -69,6 +69,9 @@ DRAWINGS: dict[str, Entry] = {
     "engine-limits": Entry(_COMPARED, "engine_limits", "experiments", "engine-limits"),
     "engine-throw": Entry(_COMPARED, "engine_throw", "experiments", "engine-throw"),
     "engine-speed": Entry(_COMPARED, "engine_speed", "timings", "engine-speed"),
+    "box-faces": Entry("stiffdice.report.figures.dice", "ends", "experiments", "box-faces"),
+    "face-response": Entry("stiffdice.report.figures.dice", "response", "experiments", "face-response"),
+    "launch-response": Entry("stiffdice.report.figures.dice", "launches", "experiments", "launch-response"),
     "model-ablation-time": Entry("stiffdice.report.figures.model_ablation", "draw_times", "timings", "model-ablation"),
 }
 
@@ -85,6 +88,8 @@ TABLES: dict[str, Entry] = {
     "toss-models": Entry(_TOSSES_TOLD, "models", "experiments", "toss-models"),
     "toss-steps": Entry(_TOSSES_TOLD, "steps", "experiments", "toss-steps"),
     "toss-chaos": Entry(_TOSSES_TOLD, "chaos", "experiments", "toss-chaos"),
+    "face-response": Entry("stiffdice.report.tables.dice", "response", "experiments", "face-response"),
+    "response-checks": Entry("stiffdice.report.tables.dice", "checks", "experiments", "response-checks"),
     "targets": Entry(_TOLD, "targets", "experiments", "work-precision", timed=True),
 }
 
@@ -101,6 +106,10 @@ EXPERIMENTS: dict[str, Entry] = {
     "held-contacts": Entry("stiffdice.experiments.held_contacts", "measure"),
     "landing": Entry("stiffdice.experiments.dice.landing", "measure", on_its_ground=True),
     "coarse-steps": Entry("stiffdice.experiments.dice.coarse_steps", "measure", on_its_ground=True),
+    "box-faces": Entry("stiffdice.experiments.dice.shapes", "measure"),
+    "face-response": Entry("stiffdice.experiments.dice.response", "measure"),
+    "launch-response": Entry("stiffdice.experiments.dice.response", "launches"),
+    "response-checks": Entry("stiffdice.experiments.dice.response", "checks"),
     "work-precision": Entry("stiffdice.experiments.work_precision.measure", "measure"),
     "toss": Entry("stiffdice.experiments.tosses.single", "measure"),
     "toss-fit": Entry("stiffdice.experiments.tosses.fit", "measure"),

@@ -1,1 +1,1 @@
-"""What dice tell: faces of many throws, by body, ground and steps."""
+"""What dice tell: faces of many throws, by body, shape, load, ground and steps; and what counts of faces say."""
