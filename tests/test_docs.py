@@ -33,6 +33,7 @@ PAGES = [
     "docs/advice.md",
     "docs/speed.md",
     "docs/stability.md",
+    "docs/dice.md",
     "docs/tradeoff.md",
     "docs/engines.md",
     "docs/engines-drake.md",

@@ -14,7 +14,20 @@ from stiffdice import __version__
 from stiffdice.cli import main as cli
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ["", "run", "advise", "throw", "tosses", "inspect", "diff", "status", "archive", "verify", "rebuild"]
+COMMANDS = [
+    "",
+    "run",
+    "advise",
+    "throw",
+    "tosses",
+    "infer",
+    "inspect",
+    "diff",
+    "status",
+    "archive",
+    "verify",
+    "rebuild",
+]
 
 
 def examples(command: str) -> list[list[str]]:

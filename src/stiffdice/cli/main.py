@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, archive, diff, inspect, rebuild, run, status, throw, tosses, verify
+from stiffdice.cli import advise, archive, diff, infer, inspect, rebuild, run, status, throw, tosses, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
 
@@ -24,6 +24,7 @@ examples:
   stiffdice advise config/scenes/figure-04.yaml --error 1%
   stiffdice throw --count 100000
   stiffdice tosses --data config/measurements/tosses.h5
+  stiffdice infer config/measurements/labby-2009.yaml
   stiffdice inspect stiff.h5
   stiffdice diff stiff.h5 softer.h5
   make archive STUDY=quick
@@ -61,7 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in (run, advise, throw, tosses, inspect, diff, status, archive, verify, rebuild):
+    for module in (run, advise, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild):
         command = commands.add_parser(
             module.__name__.rpartition(".")[2],
             help=module.HELP,

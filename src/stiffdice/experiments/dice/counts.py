@@ -7,8 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.state import Array
 from stiffdice.scene import die
+from stiffdice.scene.die import Array
 
 Counts = npt.NDArray[np.int64]
 
