@@ -27,7 +27,7 @@ def solid_angle(aspect: npt.ArrayLike) -> Array:
 
 
 def gibbs(aspect: npt.ArrayLike, beta: float) -> Array:
-    """Return a Gibbs distribution over the six faces: p_i ∝ exp(−β h_i/V^(1/3)), h_i being the height of the centre at rest.
+    """Return a Gibbs distribution over the six faces: p_i ∝ exp(−β h_i/V^(1/3)), h_i the height of the centre at rest.
 
     W. Riemer, D. Stoyan, D. Obreschkow, "Cuboidal Dice and Gibbs Distributions", Metrika 77 (2014) 247
     (arXiv:1302.3925): one parameter stands for all physical conditions. Their scale of the energy could not be looked
