@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks import BENCHMARKS
 from benchmarks.run import bench
 from stiffdice.cli.main import called
-from stiffdice.cli.progress import notes
+from stiffdice.cli.terminal.progress import notes
 from stiffdice.scene import validation
 
 EXAMPLES = """\

@@ -6,7 +6,7 @@ import time
 from functools import cache
 from pathlib import Path
 
-from stiffdice.cli.progress import notes
+from stiffdice.cli.terminal.progress import notes
 from stiffdice.errors import InputError, printable
 from stiffdice.study import config as studies
 from stiffdice.study import job_log

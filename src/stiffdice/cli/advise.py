@@ -121,7 +121,7 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.advice import recommend
     from stiffdice.advice.result import check as checked
     from stiffdice.advice.result import run_advised
-    from stiffdice.cli.progress import notes, progress
+    from stiffdice.cli.terminal.progress import notes, progress
     from stiffdice.report import advice_page
     from stiffdice.simulation.outcome import Verdict
 

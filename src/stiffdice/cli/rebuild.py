@@ -48,7 +48,7 @@ def call(options: argparse.Namespace) -> int:
 
     # This takes about a second to import; bad input is told before.
     from stiffdice.archive.rebuild import opened, rebuild, way_of
-    from stiffdice.cli.progress import notes
+    from stiffdice.cli.terminal.progress import notes
 
     with _told_to_stop(), ExitStack() as stack:
         with notes("stiffdice: unpacking and checking the archive"):

@@ -63,7 +63,7 @@ def call(options: argparse.Namespace) -> None:
     target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
 
     # These take about a second to import; bad input is told before.
-    from stiffdice.cli.progress import progress
+    from stiffdice.cli.terminal.progress import progress
     from stiffdice.dynamics.model_selection import AUTO
     from stiffdice.integrators import registry as schemes
     from stiffdice.io.writer import write_dataset

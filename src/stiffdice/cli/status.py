@@ -60,7 +60,7 @@ def call(options: argparse.Namespace) -> int:
 
 def _found(options: argparse.Namespace) -> list[Status]:
     """Return how far the study is that is named, or each that has results."""
-    from stiffdice.cli.progress import notes
+    from stiffdice.cli.terminal.progress import notes
     from stiffdice.study import status
 
     common.check_folder()

@@ -79,7 +79,7 @@ def call(options: argparse.Namespace) -> None:
         if options.animate is not None:
             _animate(thrown, Path(options.animate))
         return
-    from stiffdice.cli.progress import progress
+    from stiffdice.cli.terminal.progress import progress
 
     with progress("") as show:
         many = throws.many(scene, launches, options.scheme, steps, count, progress=show)

@@ -51,7 +51,7 @@ def call(options: argparse.Namespace) -> int:
         raise InputError("--toss: says which toss to draw, with --animate only")
 
     # These take about a second to import; bad input is told before.
-    from stiffdice.cli.progress import notes
+    from stiffdice.cli.terminal.progress import notes
     from stiffdice.scene import tosses as files
     from stiffdice.scene.scene import Ground, Scene
 

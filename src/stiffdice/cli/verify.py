@@ -30,7 +30,7 @@ def add(verify: argparse.ArgumentParser) -> None:
 def call(options: argparse.Namespace) -> int:
     """Print the report; 1 if anything fails."""
     from stiffdice.archive.verify import verify
-    from stiffdice.cli.progress import notes
+    from stiffdice.cli.terminal.progress import notes
 
     with notes(f"stiffdice: checking {printable(options.path)}"):
         report = verify(options.path)

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from stiffdice.cli import progress
+from stiffdice.cli.terminal import progress
 from stiffdice.dynamics import kernel_cache
 
 
