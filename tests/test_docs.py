@@ -33,7 +33,6 @@ PAGES = [
     "docs/advice.md",
     "docs/speed.md",
     "docs/stability.md",
-    "docs/dice.md",
     "docs/tradeoff.md",
     "docs/engines.md",
     "docs/engines-drake.md",
