@@ -11,7 +11,7 @@ from stiffdice.errors import InputError
 from stiffdice.experiments.dice import infer, response, response_table
 from stiffdice.experiments.dice.axes import FACES, pairs_of
 from stiffdice.experiments.dice.boxes import Throwing, box_of, faces_up
-from stiffdice.experiments.dice.counts import Counts
+from stiffdice.experiments.dice.rolls import Rolls
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
 
@@ -53,7 +53,7 @@ def test_a_box_with_three_different_sides_lands_as_the_coefficients_say():
 def test_a_loaded_box_of_which_only_the_counts_are_known_is_found():
     y, offset = np.array([0.04, -0.03, -0.01]), np.array([0.02, 0.0, -0.01])
     counts, _ = faces_up(box_of(SCENE, *GROUND, TOSSED.contact_time, stretch=y, offset=offset), TOSSED, seed=9)
-    found = infer.posterior(Counts(tuple(counts.tolist())), list(TABLES.values()), samples=20_000)
+    found = infer.posterior(Rolls(tuple(counts.tolist())), list(TABLES.values()), samples=20_000)
     for axis in range(3):
         _, low, high = infer.interval(found.length[:, axis])
         assert low <= np.exp(1.5 * y[axis]) - 1 <= high
