@@ -13,6 +13,7 @@ from stiffdice.cli.main import main
 from stiffdice.errors import InputError
 from stiffdice.experiments.dice.coarse_steps import steps_at
 from stiffdice.experiments.dice.throws import many
+from stiffdice.integrators import linear_stability
 from stiffdice.scene import die
 from stiffdice.scene.scene import Scene, from_mapping
 from stiffdice.simulation.launch_distribution import LaunchDistribution
@@ -30,7 +31,7 @@ def unseen(number: int) -> tuple[Scene, LaunchDistribution]:
         "load": {"at": "corner", "mass": 0.005 * random.uniform(0.01, 0.25)},
     }
     ground = {
-        "restitution": random.uniform(0.3, 0.7),
+        "restitution": random.uniform(0.1, 0.7),
         "contact_time": float(np.exp(random.uniform(np.log(0.5e-3), np.log(3e-3)))),
         "friction": random.uniform(0.05, 0.4),
     }
@@ -49,7 +50,7 @@ def compared(numbers: range, error: float, throws: int) -> tuple[float, int]:
         coarse = many(scene, launches, advised.scheme, advised.steps, throws)
         other = dataclasses.replace(launches, seed=1000 + number)
         fine = many(scene, other, advised.scheme, steps_at(scene, advised.omega_h / 3), throws)
-        assert coarse.counts.sum() > 0.999 * throws
+        assert coarse.counts.sum() > 0.99 * throws  # some spin on a corner like a top
         a, b = coarse.counts / coarse.counts.sum(), fine.counts / fine.counts.sum()
         total += float((throws * (a - b) ** 2 / (a + b)).sum())
     return total, 5 * len(numbers)
@@ -57,16 +58,21 @@ def compared(numbers: range, error: float, throws: int) -> tuple[float, int]:
 
 @pytest.mark.long
 def test_the_promise_holds_for_fifty_dice_that_it_has_not_seen():
-    """As far as so many throws can tell: an average total variation of 0.006 would be seen."""
-    chi_square, freedom = compared(range(50), 0.003, 10_000)
+    """As far as so many throws can tell: an average total variation of 0.01 would be seen."""
+    chi_square, freedom = compared(range(50), 0.003, 4_000)
     assert chi_square < freedom + 4 * np.sqrt(2 * freedom)
 
 
 def test_shorter_errors_take_more_steps_and_a_stiffer_ground_too():
     assert landing.advise(DIE, 0.001).steps > landing.advise(DIE, 0.003).steps == landing.advise(DIE, 0.1).steps
     stiff = DIE.with_ground(stiffness=4 * DIE.ground.stiffness)
-    assert landing.advise(stiff, 0.003).steps == pytest.approx(2 * landing.advise(DIE, 0.003).steps, abs=2)
-    assert landing.advise(DIE, 0.003).omega_h <= landing.LONGEST[0.003]
+    assert (
+        1.5 < landing.advise(stiff, 0.003).steps / landing.advise(DIE, 0.003).steps < 2
+    )  # the same damping is less of it
+    limit = linear_stability.stability_limit("symplectic_euler", linear_stability.hardest(DIE, "tumbling").zeta)
+    assert landing.advise(DIE, 0.003).omega_h == pytest.approx(0.6 * limit, rel=1e-3)
+    dead = from_mapping({**die.SCENE, "ground": {"restitution": 0.1, "contact_time": "1 ms"}})
+    assert landing.advise(dead, 0.003).omega_h < 0.5  # strong damping lowers the limit
 
 
 def test_what_was_not_measured_is_not_promised():

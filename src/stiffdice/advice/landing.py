@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass
 
 from stiffdice.errors import InputError
-from stiffdice.experiments.dice.coarse_steps import steps_at
 from stiffdice.integrators import linear_stability
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.landing import BATCHED, MODEL, faces_of
 
-# By total variation: the ωh of the fastest contact up to which `make landing` found the faces' distribution within it,
-# with a margin (docs/dice.md).
-LONGEST = {0.003: 0.9, 0.001: 0.3}
+# By total variation: the part of the linear stability limit up to which `make landing` found the faces' distribution
+# within it, with a margin (docs/dice.md).
+LONGEST = {0.003: 0.6, 0.001: 0.2}
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,14 @@ class LandingAdvice:
     """Steps that keep the distribution of faces.
 
     error [1]: total variation to that of short steps. steps: to the scene's duration. omega_h [1]: of the fastest
-    contact. contact: which that is.
+    contact. part: of that at which the contact is linearly unstable. contact: which that is.
     """
 
     error: float
     scheme: str
     steps: int
     omega_h: float
+    part: float
     contact: str
 
     def as_json(self) -> str:
@@ -41,7 +42,8 @@ class LandingAdvice:
             f"scheme    {self.scheme}",
             f"steps     {self.steps} to {duration:g} s, at most: a throw ends as soon as its face is decided",
             f"error     at most {self.error:g} of total variation of the faces' distribution; single paths are lost",
-            f"evidence  ωh = {self.omega_h:.2g} of the fastest contact ({self.contact}); docs/dice.md has the scan",
+            f"evidence  ωh = {self.omega_h:.2g} of the fastest contact ({self.contact}), {self.part:.0%} of its linear "
+            "limit; docs/dice.md has the scan",
         ]
 
 
@@ -63,5 +65,7 @@ def advise(scene: Scene, error: float) -> LandingAdvice:
         raise InputError(
             f"ground.stiffness = {scene.ground.stiffness:g}: a die comes to rest on ground above 0 [kg/s²]"
         )
-    steps = steps_at(scene, LONGEST[bound])
-    return LandingAdvice(bound, BATCHED, steps, hardest.omega * scene.duration / steps, hardest.mode)
+    fewest = max(linear_stability.fewest_steps(scene, MODEL, BATCHED))
+    steps = math.ceil(fewest / LONGEST[bound])
+    omega_h = hardest.omega * scene.duration / steps
+    return LandingAdvice(bound, BATCHED, steps, omega_h, LONGEST[bound], hardest.mode)

@@ -20,12 +20,13 @@ from stiffdice.integrators import linear_stability
 from stiffdice.scene import die
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation.landing import MODEL, Rest, faces_of, land
+from stiffdice.simulation.landing import BATCHED, MODEL, Rest, faces_of, land
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 from stiffdice.simulation.run import Run, simulate
 
-# ωh of the fastest contact, unless a number of steps is given.
-OMEGA_H = 0.3
+# Unless a number of steps is given: ωh of the fastest contact, and the part of the linear limit at most, which is less
+# where damping is strong.
+OMEGA_H, PART = 0.3, 0.3
 # Throws stepped at a time: some seconds' work.
 _BATCH = 8 * 4096
 # States kept of one throw.
@@ -82,9 +83,10 @@ class Throws:
 
 
 def default_steps(scene: Scene) -> int:
-    """Return the steps to the scene's duration at which the fastest contact has ωh = OMEGA_H."""
+    """Return the steps to the scene's duration at which the fastest contact has ωh = OMEGA_H, or PART of its limit."""
     omega = linear_stability.hardest(scene, MODEL).omega
-    return max(1000, math.ceil(omega * scene.duration / OMEGA_H))
+    fewest = max(linear_stability.fewest_steps(scene, MODEL, BATCHED))
+    return max(1000, math.ceil(omega * scene.duration / OMEGA_H), math.ceil(fewest / PART))
 
 
 def one(scene: Scene, launches: LaunchDistribution, scheme: str, steps: int) -> Thrown:
