@@ -91,12 +91,12 @@ def _distributions(
     scene: Scene, launches: LaunchDistribution, ladder: Sequence[float], finest: float, throws: int
 ) -> dict[str, Variable]:
     """Return the variables of the distributions at each ωh, compared with those at the finest."""
-    best = throwing.many(scene, launches, BATCHED, steps_at(scene, finest), throws, threads=1)
+    best = throwing.many(scene, launches, BATCHED, steps_at(scene, finest), throws)
     rows = []
     for value in ladder:
         # Another seed: samples that share launches agree more than distributions do.
         other = dataclasses.replace(launches, seed=launches.seed + 1)
-        found = throwing.many(scene, other, BATCHED, steps_at(scene, value), throws, threads=1, empty=True)
+        found = throwing.many(scene, other, BATCHED, steps_at(scene, value), throws, empty=True)
         total, settled = max(1, found.counts.sum()), found.counts.sum() / throws
         share = best.counts / best.counts.sum()
         mean, most = counting.sampling_distance(share, int(total), int(best.counts.sum()))

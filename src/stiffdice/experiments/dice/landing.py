@@ -52,7 +52,7 @@ def measure(
     """
     launches = launches_of(orientation, velocity_spread, spin, spin_spread, seed)
     steps = throwing.default_steps(scene) if steps is None else validation.count("steps", steps)
-    many = throwing.many(scene, launches, BATCHED, steps, validation.count("throws", throws), threads=1)
+    many = throwing.many(scene, launches, BATCHED, steps, validation.count("throws", throws))
     low, high = counting.intervals(many.counts)
     value, tail = counting.chi_square(many.counts)
     found = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -141,18 +142,17 @@ def many(
     steps: int,
     count: int,
     *,
-    threads: int | None = None,
     empty: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Throws:
     """Return the counts of many throws; raises InputError as `land` does, and where no throw settles, unless `empty`.
 
-    threads: that share them; None takes one for each core. progress: called with the fraction done.
+    As many threads share them as cores are allowed. progress: called with the fraction done.
     """
     counts, rests, times, evaluations = np.zeros(len(die.FACES), np.int64), dict.fromkeys(Rest, 0), [], 0.0
     for first in range(0, count, _BATCH):
         drawn = launches.draw(scene, min(_BATCH, count - first), first)
-        part = land(scene, drawn, steps=steps, scheme=scheme, threads=threads or os.cpu_count() or 1)
+        part = land(scene, drawn, steps=steps, scheme=scheme, threads=_cores())
         settled = part.rest == Rest.SETTLED
         counts += counting.counted(part.face, settled)
         for rest in Rest:
@@ -165,6 +165,11 @@ def many(
         told = max(rests, key=lambda rest: rests[rest]).sentence
         raise InputError(f"--steps = {steps}: no throw settled ({told}); allowed are more steps, or a longer duration")
     return Throws(scene, scheme, steps, counts, rests, np.concatenate(times), evaluations)
+
+
+def _cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def told_of_one(thrown: Thrown) -> list[str]:
