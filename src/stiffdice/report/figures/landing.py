@@ -66,8 +66,9 @@ def _distributions(panel: Any, dataset: xr.Dataset) -> None:
     order = np.argsort(work)
     panel.fill_between(work[order], 1e-4, dataset.sampling_95.values[order], color=style.FAINT, linewidth=0)
     panel.plot(work[order], distance[order], color=style.BLUE, marker="o", markersize=4)
-    for x, y, value in zip(work, distance, dataset.omega_h.values, strict=True):
-        panel.annotate(f"{value:g}", (x, y), xytext=(2, 4), textcoords="offset points", fontsize=7)
+    for k, (x, y, value) in enumerate(zip(work, distance, dataset.omega_h.values, strict=True)):
+        aside = (3, 4) if k % 2 else (-3, -11)  # neighbours may be near
+        panel.annotate(f"{value:g}", (x, y), xytext=aside, textcoords="offset points", fontsize=7)
     panel.axhline(_DISTANCE, color=style.QUIET, linewidth=0.8, linestyle=":")
     panel.set(xscale="log", yscale="log", ylim=(2e-4, 1))
     panel.xaxis.set_minor_formatter(NullFormatter())
