@@ -49,6 +49,8 @@ PAGES = [
     "docs/cost.md",
     "docs/refinement.md",
     "docs/dice.md",
+    "docs/dice-shapes.md",
+    "docs/dice-rolls.md",
     "docs/tosses.md",
     "CHANGELOG.md",
 ]

@@ -15,6 +15,7 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report import toss_page
 from stiffdice.report.figures import registry
 from stiffdice.report.figures import tosses as drawing
+from stiffdice.report.tables.tosses import VARIANT_WORDS
 from stiffdice.study.catalogue import TABLES
 
 FEW = {
@@ -63,8 +64,8 @@ def test_every_curve_of_the_steps_is_the_mean_over_tosses(found):
 @pytest.mark.long
 def test_errors_over_time_are_drawn_for_every_variant(found):
     upper, lower = drawn("toss-time", {"x": found["toss-models"]}).axes[:2]
-    assert set(lines_of(upper)) == set(lines_of(lower)) == set(drawing.VARIANT_WORDS.values())
-    assert set(models.VARIANTS) == set(drawing.VARIANT_WORDS)
+    assert set(lines_of(upper)) == set(lines_of(lower)) == set(VARIANT_WORDS.values())
+    assert set(models.VARIANTS) == set(VARIANT_WORDS)
 
 
 @pytest.mark.long

@@ -17,6 +17,7 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 from stiffdice.report.figures.registry import FRAMES_PER_SECOND, Animation
 from stiffdice.report.number_format import readable
+from stiffdice.report.tables.tosses import VARIANT_WORDS
 from stiffdice.scene.cube import LINKS
 
 # From the softest ground to the hardest, or as many of these as there are.
@@ -35,19 +36,18 @@ _SOURCES = {
     "sample": ("first sample", style.VERMILION, "o"),
     "flight": ("fit to the flight", style.BLUE, "s"),
 }
-_VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
-    "full": ("full model", {"color": style.INK, "linewidth": 2.2, "zorder": 4}),
-    "flight_launch": ("launch fitted to the flight", {"color": style.BLUE, "linewidth": 1.8, "zorder": 3}),
-    "lengths_as_stored": ("lengths as stored", {"color": style.QUIET, "linestyle": ":"}),
-    "solid_inertia": ("inertia of a solid cube", {"color": style.GREEN}),
-    "corner_inertia": ("inertia of eight corners", {"color": style.GREEN, "linestyle": "--"}),
-    "no_friction": ("no friction", {"color": style.ORANGE}),
-    "ungated": ("ungated law", {"color": style.PURPLE}),
-    "no_rotation": ("no rotation", {"color": style.VERMILION}),
-    "no_ground": ("no ground", {"color": style.VERMILION, "linestyle": "--"}),
-    "stays": ("stays as at the first sample", {"color": style.QUIET, "linestyle": "--"}),
+_VARIANTS: dict[str, dict[str, Any]] = {
+    "full": {"color": style.INK, "linewidth": 2.2, "zorder": 4},
+    "flight_launch": {"color": style.BLUE, "linewidth": 1.8, "zorder": 3},
+    "lengths_as_stored": {"color": style.QUIET, "linestyle": ":"},
+    "solid_inertia": {"color": style.GREEN},
+    "corner_inertia": {"color": style.GREEN, "linestyle": "--"},
+    "no_friction": {"color": style.ORANGE},
+    "ungated": {"color": style.PURPLE},
+    "no_rotation": {"color": style.VERMILION},
+    "no_ground": {"color": style.VERMILION, "linestyle": "--"},
+    "stays": {"color": style.QUIET, "linestyle": "--"},
 }
-VARIANT_WORDS = {name: words for name, (words, _) in _VARIANTS.items()}
 _SLOWER = 4  # the animation, than the toss
 
 
@@ -123,7 +123,7 @@ def over_time(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     shown = (("path_over_time", 100.0, (0.05, 500)), ("orientation_over_time", 180 / np.pi, (0.1, 180)))
     for panel, (name, factor, ends) in zip(panels, shown, strict=True):
         for variant, values in zip(meanings_of(found.variant), found[name].values, strict=True):
-            label, look = _VARIANTS[variant]
+            label, look = VARIANT_WORDS[variant], _VARIANTS[variant]
             panel.plot(time, factor * values[long], label=label, **look)
         panel.set(yscale="log", ylim=ends)
     panels[0].set_ylabel("path error [% of the side]")

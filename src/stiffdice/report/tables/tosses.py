@@ -10,9 +10,21 @@ import xarray as xr
 
 from stiffdice.dynamics.state import Array
 from stiffdice.io.cf_enums import meanings_of
-from stiffdice.report.figures.tosses import VARIANT_WORDS
 from stiffdice.report.markdown_table import Table, rendered
 
+# Of each variant of the model, for people.
+VARIANT_WORDS = {
+    "full": "full model",
+    "flight_launch": "launch fitted to the flight",
+    "lengths_as_stored": "lengths as stored",
+    "solid_inertia": "inertia of a solid cube",
+    "corner_inertia": "inertia of eight corners",
+    "no_friction": "no friction",
+    "ungated": "ungated law",
+    "no_rotation": "no rotation",
+    "no_ground": "no ground",
+    "stays": "stays as at the first sample",
+}
 _SOURCES = {"sample": "first sample", "flight": "fit to the flight"}
 _CRITERIA = {"path": "path", "orientation": "orientation", "face": "final face"}
 
