@@ -22,6 +22,7 @@ PACKAGE = Path(stiffdice.__file__).parent
 NAMES = [
     *("Scene", "load_scene", "scene_from_mapping"),
     *("simulate", "Run", "Trajectory", "Verdict"),
+    *("LaunchDistribution", "land", "Landing", "Rest"),
     *("advise", "Advice", "Option", "run_advised"),
     *("run_dataset", "write_dataset", "open_results"),
     *("StiffdiceError", "InputError", "OutputError"),

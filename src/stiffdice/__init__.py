@@ -3,7 +3,8 @@
 A scene (`Scene`) is read from a file (`load_scene`) or from plain data (`scene_from_mapping`). `simulate` runs it and
 returns a `Run`: verdict, measures and, if asked, the `Trajectory`. `run_dataset` and `write_dataset` turn a run into a
 dataset of xarray and into a file; `open_results` opens files of runs, sweeps and experiments. `advise` says which
-scheme and how many steps keep an error, and `run_advised` makes that run.
+scheme and how many steps keep an error, and `run_advised` makes that run. `land` throws a die as often as a
+`LaunchDistribution` draws launches, and says which faces are up.
 
 ```python
 import stiffdice
@@ -53,6 +54,11 @@ _PUBLIC = {
     "Run": "stiffdice.simulation.run:Run",
     "Trajectory": "stiffdice.simulation.run:Trajectory",
     "Verdict": "stiffdice.simulation.outcome:Verdict",
+    # Many throws of a die, until its faces are decided.
+    "LaunchDistribution": "stiffdice.simulation.launch_distribution:LaunchDistribution",
+    "land": "stiffdice.simulation.landing:land",
+    "Landing": "stiffdice.simulation.landing:Landing",
+    "Rest": "stiffdice.simulation.landing:Rest",
     # Which run to make.
     "advise": "stiffdice.advice.recommend:advise",
     "Advice": "stiffdice.advice.result:Advice",

@@ -7,6 +7,8 @@ from stiffdice.scene.scene import Scene
 from stiffdice.scene.scene import from_mapping as scene_from_mapping
 from stiffdice.scene.scene import load as load_scene
 from stiffdice.simulation.dataset import run_dataset
+from stiffdice.simulation.landing import Landing, Rest, land
+from stiffdice.simulation.launch_distribution import LaunchDistribution
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.run import Run, Trajectory, simulate
 
@@ -14,14 +16,18 @@ __version__: str
 __all__ = [
     "Advice",
     "InputError",
+    "Landing",
+    "LaunchDistribution",
     "Option",
     "OutputError",
+    "Rest",
     "Run",
     "Scene",
     "StiffdiceError",
     "Trajectory",
     "Verdict",
     "advise",
+    "land",
     "load_scene",
     "open_results",
     "run_advised",
