@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import rounds
+from tests.conftest import ROOT
 
 from stiffdice.archive import manifest
-from stiffdice.archive.verify import CRATE, verify
+from stiffdice.archive.verify import CRATE, Report, _check_measurements, verify
 from stiffdice.cli.main import main
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.io.reader import open_file, parts
@@ -325,3 +326,15 @@ def test_a_sweep_without_its_shards_says_so(folder):
     for path in (*(folder / SWEEP / "shards").iterdir(), folder / SWEEP / "shards.csv"):
         path.unlink()
     assert "numbers of sweeps and surveys apart from their shards" in verify(folder / SWEEP).lines()[-1]
+
+
+def test_measurements_are_tried_by_their_own_reader(tmp_path):
+    """They are no files of ours; one that was spoilt is told all the same."""
+    name, spoilt = "config/measurements/tosses.h5", tmp_path / "spoilt.h5"
+    data = bytearray((ROOT / name).read_bytes())
+    data[len(data) // 2 :] = b""
+    spoilt.write_bytes(data)
+    for path, wrong in ((ROOT / name, []), (spoilt, [name])):
+        report = Report("archive.zip", "archive")
+        _check_measurements(report, {name: path})
+        assert [problem[0] for problem in report.problems] == wrong

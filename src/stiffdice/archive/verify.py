@@ -34,6 +34,8 @@ from stiffdice.sweep.collect import collect
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
 _SCHEMA = Path("workflow/schemas/study.schema.yaml")
 # Of a job, under the folder of its study's results.
+# Data that a project came with, and what tries a file of them.
+_MEASUREMENTS, _READER = "config/measurements/", "stiffdice.scene.tosses"
 _LOG = re.compile("((?:.*/)?)logs/.+[.]log")
 # Files of these formats need not hold all that the checks look at.
 _BEFORE_SANITY = ("1.0", "1.1")
@@ -133,7 +135,7 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
             report.fail(name, "a link or a special file; allowed are files and folders")
         elif is_archive or not (path.name.startswith(".") and path.suffix == ".part"):  # an interrupted command's
             files[name] = path
-    data = {name: path for name, path in files.items() if name.endswith(".h5")}
+    data = {name: path for name, path in files.items() if _is_result(name)}
     if not is_archive and not data:
         raise InputError(f"{report.path}: holds neither {manifest.NAME} nor any .h5 file; nothing to check")
     for name, reason in damaged.items():
@@ -147,7 +149,20 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
     else:
         report.note(f"digests (there is no {manifest.NAME})")
         _check_asked(report, folder, files)
+    _check_measurements(report, {name: path for name, path in files.items() if name.startswith(_MEASUREMENTS)})
     _Files(report, data, files).check_all()
+
+
+def _is_result(name: str) -> bool:
+    """Return whether a file is one of ours, with results; measurements that came with a project are not."""
+    return name.endswith(".h5") and not name.startswith(_MEASUREMENTS)
+
+
+def _check_measurements(report: Report, files: Mapping[str, Path]) -> None:
+    """Try the measured tosses among a project's measurements as their reader does."""
+    tosses = {str(path): name for name, path in files.items() if name.endswith(".h5")}
+    for path, error in isolation.refused(tosses, _READER).items():
+        report.fail(tosses[path], _reason(error, Path(path)))
 
 
 def _check_digests(report: Report, name: str, how: str, files: Mapping[str, Path], digests: Mapping[str, str]) -> None:
@@ -205,7 +220,7 @@ def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> Non
 
 def _check_made(report: Report, folder: Path, files: Mapping[str, Path]) -> None:
     """Check results against the digests that their jobs' logs say."""
-    untold = {name for name in files if name.endswith(".h5")}
+    untold = {name for name in files if _is_result(name)}
     for name, path in files.items():
         if not (log := _LOG.fullmatch(name)) or (told := job_log.read(path)) is None:
             continue
