@@ -74,7 +74,9 @@ def _signature(name: str, function: Any) -> str:
 
 
 def _default(value: object) -> str:
-    return "" if value in (inspect.Parameter.empty, dataclasses.MISSING) else f" = {value!r}"
+    if value in (inspect.Parameter.empty, dataclasses.MISSING):
+        return ""
+    return f' = "{value}"' if isinstance(value, str) else f" = {value!r}"  # in the quotes that ruff takes
 
 
 def _code(text: str) -> str:
