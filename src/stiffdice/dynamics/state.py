@@ -121,8 +121,13 @@ def spin_of(cube: Cube, state: Any, nodes: Array | None = None) -> Array:
 
 def turned_tensor(cube: Cube, nodes: Array) -> Array:
     """Return tensors of inertia [kg m²], shape (..., 3, 3), of a cube whose nodes, shape (..., 8, 3), are so turned."""
-    edges = np.einsum("ke,...kx->...ex", SIGNS, nodes) / len(SIGNS) / np.array(cube.half_sides)[:, None]
+    edges = edges_of(cube, nodes)
     return np.asarray(np.einsum("...ei,ef,...fj->...ij", edges, cube.distribution.tensor, edges))
+
+
+def edges_of(cube: Cube, nodes: Array) -> Array:
+    """Return the directions of a cube's edges, one a row, shape (..., 3, 3), whose nodes, shape (..., 8, 3), are so."""
+    return np.asarray(np.einsum("ke,...kx->...ex", SIGNS, nodes) / len(SIGNS) / np.array(cube.half_sides)[:, None])
 
 
 class Ensemble(NamedTuple):

@@ -49,7 +49,7 @@ _OPEN = -1
 # A throw whose energy is so many times that of its launch has blown up.
 _BLOWN = 10.0
 # A body that is not decided at the end, but moves with less than this part of what it lacks to tip, leans on an edge.
-_STILL = 1e-3
+STILL = 1e-3
 
 
 class Rest(IntEnum):
@@ -173,7 +173,7 @@ def _decide(common: _Common, throws: _Throws, m: int, over: bool) -> bool:
         throws.rest[m] = 3
         return True
     touches = height_of(system.physics, state) <= lowest_of(system.physics, state)
-    throws.rest[m] = 1 if touches and moving < _STILL * abs(gap) else 2
+    throws.rest[m] = 1 if touches and moving < STILL * abs(gap) else 2
     return over
 
 
@@ -262,15 +262,6 @@ def _march_alone(common: _Common, throws: _Throws, first: int, most: int) -> int
     return -1
 
 
-@njit(cache=True)
-def _energies(system: System, states: States, late: float) -> Array:
-    result = np.empty(len(states))
-    for k in range(len(states)):
-        moving = energy.kinetic_at_place(system.model, system.physics, states[k], late)
-        result[k] = moving + energy.potential(system.physics, states[k]) + energy.elastic(system.physics, states[k])
-    return result
-
-
 def land(
     scene: Scene,
     launches: States,
@@ -327,7 +318,9 @@ def _throws(common: _Common, launches: States) -> _Throws:
     """Return throws that stand at their launches."""
     count, late = len(launches), common.lag * common.k.h
     steps, face, rest = np.zeros(count, np.int64), np.zeros(count, np.int8), np.full(count, _OPEN, np.int8)
-    return _Throws(launches.copy(), steps, face, rest, np.zeros(count), _energies(common.system, launches, late))
+    return _Throws(
+        launches.copy(), steps, face, rest, np.zeros(count), energy.mechanical(*common.system, launches, late)
+    )
 
 
 def _advance(common: _Common, throws: _Throws) -> None:

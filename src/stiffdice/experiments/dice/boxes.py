@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from stiffdice.errors import InputError
+from stiffdice.experiments.dice.counts import Counts
+from stiffdice.experiments.dice.throws import many
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation.landing import BATCHED, Rest, land
+from stiffdice.simulation.landing import BATCHED
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 
 MODEL, SCHEME = "tumbling", BATCHED
@@ -80,16 +81,13 @@ def box_of(
     return scenes.from_mapping(keys)
 
 
-def faces_up(scene: Scene, throwing: Throwing, seed: int) -> tuple[npt.NDArray[np.int64], int]:
+def faces_up(scene: Scene, throwing: Throwing, seed: int) -> tuple[Counts, int]:
     """Return how often each face came up, shape (6,), of the throws that settled, and how many did not.
 
     Raises InputError for a scene that cannot be thrown, and where no face came up at all.
     """
-    launches = LaunchDistribution(
-        velocity_spread=throwing.velocity_spread, spin_spread=throwing.spin_spread, seed=seed
-    ).draw(scene, throwing.throws)
-    landed = land(scene, launches, steps=throwing.steps)
-    settled = landed.rest == Rest.SETTLED
-    if not settled.any():
+    launches = LaunchDistribution(velocity_spread=throwing.velocity_spread, spin_spread=throwing.spin_spread, seed=seed)
+    found = many(scene, launches, SCHEME, throwing.steps, throwing.throws, empty=True)
+    if not found.counts.any():
         raise InputError(f"duration = {scene.duration:g}: no throw settles; allowed is a longer one [s]")
-    return np.bincount(landed.face[settled], minlength=7)[1:], int((~settled).sum())
+    return found.counts, throwing.throws - int(found.counts.sum())

@@ -22,8 +22,8 @@ from stiffdice.errors import InputError
 from stiffdice.experiments.dice import counts as counting
 from stiffdice.experiments.dice import throws as throwing
 from stiffdice.experiments.dice.landing import launches_of
+from stiffdice.experiments.dice.throws import steps_at
 from stiffdice.experiments.measuring import Variable, coordinates, numbers, quantity, result
-from stiffdice.integrators import linear_stability
 from stiffdice.scene import die, validation
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.landing import BATCHED, MODEL, land
@@ -42,11 +42,6 @@ class _Reference(NamedTuple):
     place: Array
     distance: Array
     face: np.ndarray[tuple[int, ...], np.dtype[np.int8]]
-
-
-def steps_at(scene: Scene, omega_h: float) -> int:
-    """Return the steps to the scene's duration at which its fastest contact has this ωh."""
-    return max(1, math.ceil(linear_stability.hardest(scene, MODEL).omega * scene.duration / omega_h))
 
 
 def measure(

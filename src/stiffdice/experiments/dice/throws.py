@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import Array
+from stiffdice.dynamics.state import Array, edges_of
 from stiffdice.errors import InputError
 from stiffdice.experiments.dice import counts as counting
 from stiffdice.experiments.dice.counts import Counts
 from stiffdice.integrators import linear_stability
 from stiffdice.scene import die
-from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.scene import Launch, Scene
-from stiffdice.simulation.landing import BATCHED, MODEL, Rest, faces_of, land
+from stiffdice.simulation.landing import BATCHED, MODEL, STILL, Rest, faces_of, land
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 from stiffdice.simulation.run import Run, simulate
 
@@ -83,11 +82,15 @@ class Throws:
         }
 
 
+def steps_at(scene: Scene, omega_h: float) -> int:
+    """Return the steps to the scene's duration at which its fastest contact has this ωh."""
+    return max(1, math.ceil(linear_stability.hardest(scene, MODEL).omega * scene.duration / omega_h))
+
+
 def default_steps(scene: Scene) -> int:
     """Return the steps to the scene's duration at which the fastest contact has ωh = OMEGA_H, or PART of its limit."""
-    omega = linear_stability.hardest(scene, MODEL).omega
     fewest = max(linear_stability.fewest_steps(scene, MODEL, BATCHED))
-    return max(1000, math.ceil(omega * scene.duration / OMEGA_H), math.ceil(fewest / PART))
+    return max(1000, steps_at(scene, OMEGA_H), math.ceil(fewest / PART))
 
 
 def one(scene: Scene, launches: LaunchDistribution, scheme: str, steps: int) -> Thrown:
@@ -101,22 +104,20 @@ def one(scene: Scene, launches: LaunchDistribution, scheme: str, steps: int) -> 
     )
     assert run.trajectory is not None
     states, energy = run.trajectory.state, np.asarray(run.trajectory.mechanical_energy)
-    edges = np.einsum("ke,mkx->mex", SIGNS, states["node_offset"]) / len(SIGNS) / faces.half_sides[:, None]
-    below = die.face_below(-edges[:, :, 2], faces.height)
+    below = die.face_below(-edges_of(scene.cube, states["node_offset"])[:, :, 2], faces.height)
     decided = np.flatnonzero(energy < faces.barrier[below - 1])
     if len(decided):
         first = decided[0]
         return Thrown(run, die.opposite(int(below[first])), Rest.SETTLED, float(run.trajectory.time[first]))
     moving = float(run.trajectory.kinetic_energy[-1])
     gap = float(faces.barrier[below[-1] - 1]) - scene.cube.mass * scene.gravity * float(faces.height[below[-1] - 1])
-    rest = Rest.COCKED if moving < 1e-3 * abs(gap) else Rest.UNSETTLED
+    rest = Rest.COCKED if moving < STILL * abs(gap) else Rest.UNSETTLED
     return Thrown(run, die.opposite(int(below[-1])), rest, None)
 
 
 def _rotation_vector(nodes: Array, scene: Scene) -> tuple[float, float, float]:
     """Return the rotation vector [rad] that turns the upright body's nodes into these."""
-    edges = np.einsum("ke,kx->ex", SIGNS, nodes) / len(SIGNS) / np.array(scene.cube.half_sides)[:, None]
-    turn = edges.T
+    turn = edges_of(scene.cube, nodes).T
     # The quaternion's largest part first (Shepperd 1978, J. Guidance and Control 1, 223).
     trace = float(np.trace(turn))
     parts = np.array([trace, *np.diag(turn)])
