@@ -46,6 +46,24 @@ def reaches(physics: Any, clearance: float) -> bool:
 
 
 @njit
+def falling(physics: Any) -> Wrench:
+    """Return force and torque on a body that nothing touches."""
+    return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+
+
+@njit
+def together(a: Wrench, b: Wrench) -> Wrench:
+    """Return the sum of forces [N] and torques [N m] about one point."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@njit
+def change(new: Wrench, old: Wrench) -> Wrench:
+    """Return by how much force [N] and torque [N m] have changed."""
+    return new[0] - old[0], new[1] - old[1], new[2] - old[2], new[3] - old[3], new[4] - old[4], new[5] - old[5]
+
+
+@njit
 def normal_force(physics: Any, depth: float, speed: float) -> float:
     """Return the magnitude of the normal force on one node [N]; speed [m/s]: along the outward normal."""
     return push(physics.onset, depth, physics.damping * speed, physics.stiffness)

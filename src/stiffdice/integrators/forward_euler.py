@@ -18,6 +18,7 @@ ForwardEuler = namedtuple("ForwardEuler", ())
 TAG = ForwardEuler()
 FORMULA = "x += h u; nodes turned by h L/I; then u += h a; L += h torque, all of the old state"
 LAG = -0.5  # the velocity of a step is the path's slope half a step after it: x_(n+1) = x_n + h u_n
+OF_PAIRS = True
 
 
 @njit

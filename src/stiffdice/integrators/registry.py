@@ -7,7 +7,8 @@ A scheme that takes steps of its own, of which one of ours may need any number, 
 advances a state by an interval, or by less after some work. A run goes on from there, so that it can be stopped, and
 ended by a budget, within an interval. Work is counted, not timed: a run is the same on every machine. One that has a
 `swing`, for which the bounds of `fast_forward.py` are proven, takes many steps of a contact at once. One that does not
-apply to every scene and model also has `unfit(scene, model)`, which says why not.
+apply to every scene and model also has `unfit(scene, model)`, which says why not. OF_PAIRS: true of one that uses the
+model only by its `force`, `kick`, `drift` and `change`, so that two boxes can be run by it, too.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ LAGS: dict[str, float] = {name: module.LAG for name, module in _MODULES.items()}
 
 # Schemes that take steps of their own between two states: what happens in one of ours, they do not tell.
 OWN_STEPS = frozenset(name for name, module in _MODULES.items() if getattr(module, "OWN_STEPS", False))
+
+# Schemes that two boxes can be run by.
+OF_PAIRS = tuple(name for name, module in _MODULES.items() if getattr(module, "OF_PAIRS", False))
 
 # What a scheme that controls its own error aims at, relative to the motion, unless told otherwise.
 TOLERANCE = 1e-9

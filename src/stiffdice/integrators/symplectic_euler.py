@@ -19,6 +19,7 @@ SymplecticEuler = namedtuple("SymplecticEuler", ())
 TAG = SymplecticEuler()
 FORMULA = "u += h a; L += h torque; x += h u; nodes turned by h L/I"
 LAG = 0.5  # the velocity of a step is the path's slope half a step before it: x_n = x_(n−1) + h u_n
+OF_PAIRS = True
 
 
 @njit

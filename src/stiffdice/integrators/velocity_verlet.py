@@ -16,7 +16,6 @@ from typing import Any
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import Physics
-from stiffdice.integrators.free_flight import plus
 
 VelocityVerlet = namedtuple("VelocityVerlet", ())
 TAG = VelocityVerlet()
@@ -25,6 +24,7 @@ FORMULA = (
     "corrected once"
 )
 LAG = 0.0  # the velocity is the path's slope at the place: x_(n+1) = x_n + h u_n + h² a/2
+OF_PAIRS = True
 
 
 @njit
@@ -35,5 +35,5 @@ def step(model: Any, physics: Physics, state: Any, h: float, tolerance: float) -
     models.drift(model, physics, state, h)
     models.kick(model, physics, state, old, h / 2)
     new = models.force(model, physics, state)
-    models.kick(model, physics, state, plus(new, old, -1.0), h / 2)
+    models.kick(model, physics, state, models.change(model, new, old), h / 2)
     return 2

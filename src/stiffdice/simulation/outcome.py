@@ -26,6 +26,7 @@ class Verdict(IntEnum):
     STALLED = 8
     UNDECIDED = 9
     UNRESOLVED = 10
+    DEEP = 11
 
     @property
     def sentence(self) -> str:
@@ -43,6 +44,7 @@ _SENTENCES = {
     Verdict.SANK: "sank or tunnelled: the whole cube was below the ground at the end, deeper than a bounce",
     Verdict.UNDECIDED: "undecided: the budget of steps or force evaluations was spent before the end",
     Verdict.STALLED: "stalled: the steps are too short for double precision to move the cube",
+    Verdict.DEEP: "deep: two cubes overlapped so far that which way is out is not known",
     Verdict.BLEW_UP: f"blew up: the airborne energy passed {BLOW_UP:g} times the start's",
     Verdict.LEFT_NUMERIC_RANGE: "left the numeric range: a number grew past what double precision holds",
 }

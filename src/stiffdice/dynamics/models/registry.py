@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from stiffdice.dynamics import contact
 from stiffdice.dynamics.compilation import by_tag, constant, njit
-from stiffdice.dynamics.contact import Wrench, height_of, lowest_of, reaches
+from stiffdice.dynamics.contact import Wrench, falling, height_of, lowest_of, reaches
 from stiffdice.dynamics.inertia import rotate
-from stiffdice.dynamics.models import free_flight, sliding, tumbling, vertical
+from stiffdice.dynamics.models import free_flight, pair, sliding, tumbling, vertical
 from stiffdice.dynamics.state import TOUCHING, TURNING, Physics
 from stiffdice.dynamics.vector import norm, vector
 
@@ -26,7 +27,7 @@ MODELS = {name: module.TAG for name, module in _MODULES.items()}
 
 
 def _chosen(part: str) -> Callable[..., Any]:
-    return by_tag({type(module.TAG): getattr(module, part) for module in _MODULES.values()})
+    return by_tag({type(module.TAG): getattr(module, part) for module in (*_MODULES.values(), pair)})
 
 
 # (model, physics, state, wrench, h): advance the momenta, and the nodes' spin, by h [s] under a force and torque.
@@ -36,16 +37,25 @@ drift = _chosen("drift")
 # (model) -> whether the body turns; whether the ground can act on it.
 turns = by_tag({type(tag): constant(name in TURNING) for name, tag in MODELS.items()})
 touches = by_tag({type(tag): constant(name in TOUCHING) for name, tag in MODELS.items()})
-# (model, physics, state) -> force [N] and torque [N m] on the body near the ground.
-_near = _chosen("force")
 
 
-@njit
-def force(model: Any, physics: Physics, state: Any) -> Wrench:
-    """Return force [N] and torque [N m] on the body in this state."""
-    if touches(model) and reaches(physics, height_of(physics, state) - physics.reach):
-        return _near(model, physics, state)
-    return 0.0, 0.0, -physics.weight, 0.0, 0.0, 0.0
+def _force_of(module: Any, touching: bool) -> Any:
+    near = module.force
+
+    @njit
+    def force(physics: Physics, state: Any) -> Wrench:
+        if touching and reaches(physics, height_of(physics, state) - physics.reach):
+            return near(physics, state)
+        return falling(physics)
+
+    return force
+
+
+_FORCES = {type(module.TAG): _force_of(module, name in TOUCHING) for name, module in _MODULES.items()}
+# (model, physics, state) -> force [N] and torque [N m] on the body in this state, or on each of two.
+force = by_tag({**_FORCES, type(pair.TAG): pair.force})
+# (model, new, old) -> by how much these have changed.
+change = by_tag({**dict.fromkeys(_FORCES, contact.change), type(pair.TAG): pair.change})
 
 
 @njit
