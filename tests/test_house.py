@@ -72,7 +72,7 @@ CHANGES = {
         ("TAG = Sliding", "TAG = Gliding"),
     ],
     "dynamics/models/registry.py": [
-        ("import free_flight, sliding", "import free_flight, gliding, sliding"),
+        ("import free_flight, pair", "import free_flight, gliding, pair"),
         ('    "flying": free_flight,\n', '    "flying": free_flight,\n    "gliding": gliding,\n'),
     ],
     "dynamics/state.py": [('{"vertical", "sliding", "tumbling"}', '{"vertical", "sliding", "tumbling", "gliding"}')],

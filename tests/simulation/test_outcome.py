@@ -16,7 +16,7 @@ def test_every_verdict_has_its_sentence_and_its_place():
 def test_the_numbers_are_those_that_files_hold():
     """A new verdict gets a new number: files written before keep their meaning."""
     names = ["passed", "apex_rose", "energy_grew", "sank", "blew_up", "left_numeric_range"]
-    names += ["restitution_off", "off_trajectory", "stalled", "undecided", "unresolved"]
+    names += ["restitution_off", "off_trajectory", "stalled", "undecided", "unresolved", "deep"]
     assert [verdict.name.lower() for verdict in Verdict] == names
     assert [int(verdict) for verdict in Verdict] == list(range(len(names)))
 

@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiffdice.dynamics.box_contact.overlap import CONTACT, MOST, Frame, Overlap, frame_of, overlap_of
-from stiffdice.dynamics.box_contact.pair_state import PairPhysics, are_near
+from stiffdice.dynamics.box_contact.pair_state import PairPhysics, Pairs, are_near
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
-from stiffdice.dynamics.vector import Vector, cross, dot, minus, norm, plus, plus_times, times, vector
+from stiffdice.dynamics.state import Array
+from stiffdice.dynamics.vector import Vector, assign, cross, dot, minus, norm, plus, plus_times, times, vector
 
 FORMULA = (
     "boxes overlap, U = S/2 sum of w d^2 at the vertices of the overlap below the face where that is least; at each "
@@ -141,3 +142,15 @@ def elastic_energy(physics: PairPhysics, pair: Any) -> float:
         return 0.0
     _, least = overlap(physics, pair, np.empty(2 * MOST, CONTACT))
     return 0.5 * physics.stiffness * least.square
+
+
+@njit(cache=True)
+def evaluate(physics: PairPhysics, pairs: Pairs) -> tuple[Array, Array]:
+    """Return the energy between the boxes [J], shape (state,), and the wrench on either, shape (state, 2, 6)."""
+    energy, wrenches = np.empty(len(pairs)), np.empty((len(pairs), 2, 6))
+    for k in range(len(pairs)):
+        energy[k] = elastic_energy(physics, pairs[k])
+        a, b = contact_wrenches(physics, pairs[k])
+        assign(wrenches[k, 0], a)
+        assign(wrenches[k, 1], b)
+    return energy, wrenches

@@ -55,7 +55,7 @@ MOST = 40
 
 # By how much a column is wider than its box, relative to it. Cubes that stand flush have the nodes of one on the planes
 # of the other: this far inside, they are no matter of round-off.
-MARGIN = 1e-9
+MARGIN = 1e-12
 
 
 def _edges() -> npt.NDArray[np.int64]:

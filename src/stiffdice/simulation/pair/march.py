@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.box_contact.pair_state import PairPhysics, Pairs, are_near
+from stiffdice.dynamics.box_contact.pair_state import PairPhysics, Pairs
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.models.pair import TAG
 from stiffdice.dynamics.vector import minus, norm, vector
 from stiffdice.integrators import registry as schemes
 from stiffdice.simulation.pair import energy
+from stiffdice.simulation.pair.flight import fly, time_to_meet
 
 # Steps, about, after which compiled code returns, to see signals and tell progress.
 _WORK = 100_000
@@ -64,12 +65,19 @@ def _is_finite(pair: Any) -> bool:
 
 
 @njit
-def _watch(physics: PairPhysics, pair: Any, limits: Limits, memory: Any) -> None:
-    """Take note of what the last step has done.
+def _is_deep(physics: PairPhysics, pair: Any, limits: Limits) -> bool:
+    """Return whether the opposite face of the thinner box may be as near after the next step, or be passed in it.
 
-    A contact is deep where the opposite face of the thinner box could be as near a step later: which way is out is not
-    known then. So is one that a step can jump over.
+    Which way is out is not known then.
     """
+    if not time_to_meet(physics, pair) <= limits.h:
+        return False
+    return bool(pair.depth + _approach(physics, pair) * limits.h >= limits.half)
+
+
+@njit
+def _watch(physics: PairPhysics, pair: Any, limits: Limits, memory: Any) -> None:
+    """Take note of what the last step has done."""
     memory.deepest = max(memory.deepest, pair.depth)
     touching = pair.depth > 0.0
     if touching and memory.touching == 0:
@@ -77,8 +85,6 @@ def _watch(physics: PairPhysics, pair: Any, limits: Limits, memory: Any) -> None
     memory.touching = 1 if touching else 0
     if not _is_finite(pair):
         memory.ending = LOST
-    elif are_near(physics, pair) and pair.depth + _approach(physics, pair) * limits.h >= limits.half:
-        memory.ending = DEEP
     if not touching and energy.clearance(physics, pair) > 0.0:
         memory.airborne = max(memory.airborne, energy.airborne(physics, pair, limits.lag_time))
 
@@ -103,10 +109,18 @@ def march(
         while seen.done < limits.steps and seen.ending == 0:
             if work >= _WORK:
                 return True
-            work += schemes.step(scheme, TAG, physics, pair, limits.h, tolerance)
+            to_keep = limits.every - seen.done % limits.every if limits.every > 0 else limits.steps
+            steps = fly(scheme, physics, pair, limits.h, min(to_keep, limits.steps - seen.done))
+            if steps == 0:
+                if _is_deep(physics, pair, limits):
+                    seen.ending = DEEP
+                    break
+                steps = 1
+                schemes.step(scheme, TAG, physics, pair, limits.h, tolerance)
+            work += 1
             _watch(physics, pair, limits, seen)
             if seen.ending != LOST:
-                seen.done += 1
+                seen.done += steps
                 if limits.every > 0 and seen.done % limits.every == 0:
                     samples[seen.done // limits.every] = pair
     return False

@@ -70,7 +70,7 @@ def check_scheme(scheme: str) -> None:
         validation.choice("scheme", scheme, schemes.SCHEMES)
         raise InputError(
             f"scheme = {scheme}: allowed is {' or '.join(schemes.OF_PAIRS)} for two cubes; {scheme} follows the "
-            "contact of one cube with a plane; velocity_verlet with short steps is the most accurate of these"
+            "contact of one cube with a plane; rk4 with short steps is the most accurate of these"
         )
 
 
