@@ -13,6 +13,7 @@ BENCHMARKS: dict[str, str] = {
     "octave": "benchmarks.octave",
     "engines": "benchmarks.engines",
     "landing": "benchmarks.landing",
+    "pair": "benchmarks.pair",
     "skipping": "benchmarks.skipping",
     "cold": "benchmarks.cold",
     "jobs": "benchmarks.jobs",

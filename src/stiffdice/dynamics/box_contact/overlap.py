@@ -340,5 +340,6 @@ def overlap_of(first: Frame, second: Frame, contacts: Contacts) -> Overlap:
     for k in range(2):
         for axis in range(3):
             for sign in (-1.0, 1.0):
-                least = _less(k, Face(axis, sign), views[k], contacts, least)
+                if (k, axis, sign) != (box, face.axis, face.sign):
+                    least = _less(k, Face(axis, sign), views[k], contacts, least)
     return least
