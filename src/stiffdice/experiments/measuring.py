@@ -33,6 +33,7 @@ _COORDINATES = {
     "damping": ("ground damping", "kg s-1"),
     "duration": ("duration of the runs", "s"),
     "face": ("pips of the face", "1"),
+    "force": ("force by overlap", "1"),
     "friction": ("friction coefficient", "1"),
     "hop_height": ("height from which rebounds count", "m"),
     "inertia": ("moment of inertia of the cube", "1"),
@@ -42,6 +43,8 @@ _COORDINATES = {
     "nudge": ("nudge to a cube at rest on its face", "1"),
     "nudge_zeta": ("damping ratio of the nudged motion", "1"),
     "omega_h_relative": ("omega h of the nudged motion over its limit by theory", "1"),
+    "packing": ("packing of spheres", "1"),
+    "part": ("step over the duration of the impact", "1"),
     "path_omega_h": ("omega h of the fastest contact, of paths", "1"),
     "phase": ("fraction of the step before the nodes meet the ground", "1"),
     "piece": ("piece of the full model that the scene does not need", "1"),
@@ -57,6 +60,7 @@ _COORDINATES = {
     "time": ("time since the launch", "s"),
     "tolerance": ("tolerance of the scheme event", "1"),
     "value": ("value of the number that is changed", "1"),
+    "young": ("Young's modulus", "Pa"),
     "zeta": ("damping ratio of the mode itself, (D/S) omega/2", "1"),
 }
 
