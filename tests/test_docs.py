@@ -37,6 +37,7 @@ PAGES = [
     "docs/engines.md",
     "docs/engines-drake.md",
     "docs/engines-mujoco-pybullet.md",
+    "docs/granular.md",
     "docs/FORMAT.md",
     "docs/archive.md",
     "docs/verify.md",

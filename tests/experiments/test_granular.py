@@ -43,6 +43,11 @@ def test_nudges_grow_beyond_the_linear_limit_and_not_below(name, force):
     assert granular._grows(PACKINGS[name], force, 1.003 * stable)
 
 
+@pytest.mark.parametrize("name", PACKINGS)
+def test_packings_fly_apart_at_steps_that_exadems_rule_calls_correctly_defined(name):
+    assert granular._grows(PACKINGS[name], "linear", 0.99 * math.pi)
+
+
 @pytest.mark.long
 def test_the_table_has_theory_and_measurement_in_one():
     found = granular.steps(Scene())

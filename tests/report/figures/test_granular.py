@@ -17,7 +17,7 @@ def measured():
 def test_least_and_largest_restitution_of_each_force_are_drawn(measured):
     figure = drawn("granular-impacts", measured)
     check_units(figure)
-    drawn_lines = [line.get_ydata().tolist() for line in figure.axes[0].get_lines()]
+    drawn_lines = [list(line.get_ydata()) for line in figure.axes[0].get_lines()]
     for ends in (measured["impacts"].least, measured["impacts"].largest):
         assert all(row.values.tolist() in drawn_lines for row in ends)
 
