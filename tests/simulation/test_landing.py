@@ -61,7 +61,7 @@ def test_the_face_that_energy_decides_is_the_one_at_rest(body, ground):
     assert (early.steps[decided] < full.steps[decided]).all()
 
 
-@pytest.mark.long
+@pytest.mark.broad
 @pytest.mark.parametrize("ground", ["hard", "ungated"])
 def test_no_face_differs_from_full_rest_in_a_hundred_thousand_throws(ground):
     scene = scene_of("cube", ground)
@@ -73,9 +73,10 @@ def test_no_face_differs_from_full_rest_in_a_hundred_thousand_throws(ground):
     assert not (early.face != full.face)[decided].any()
 
 
-@pytest.mark.long
-def test_a_fair_cube_from_uniform_orientations_comes_out_fair():
-    count = 200_000
+@pytest.mark.parametrize(
+    "count", [pytest.param(20_000, marks=pytest.mark.long), pytest.param(200_000, marks=pytest.mark.broad)]
+)
+def test_a_fair_cube_from_uniform_orientations_comes_out_fair(count):
     scene = scene_of()
     result = land(scene, THROWN.draw(scene, count), steps=16_000, threads=2)
     seen = np.bincount(result.face, minlength=7)[1:]
