@@ -101,8 +101,13 @@ print(energies(physics_of(scene), start_of(scene, "sliding"))[2][0])
 """
 
 
-@pytest.mark.parametrize("first", ["", "import numba\n"], ids=["", "numba imported before"])
-@pytest.mark.long
+@pytest.mark.parametrize(
+    "first",
+    [
+        pytest.param("", id="", marks=pytest.mark.long),
+        pytest.param("import numba\n", id="numba imported before", marks=pytest.mark.broad),
+    ],
+)
 def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     """Numba itself would not notice: the kernel that is cached lies in another file."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}

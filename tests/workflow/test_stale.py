@@ -236,7 +236,7 @@ def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp
         assert len(failing) == len(names)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_a_figure_that_was_touched_up_is_set_aside_and_made_again(copied):
     figure = copied.folder / "results/tiny/figures/position.png"
     before = figure.read_bytes()

@@ -139,8 +139,8 @@ class Project:
 def finished(tmp_path_factory):
     """A project whose study has run; tests that change it take their changes back."""
     project = Project(tmp_path_factory.mktemp("finished"), own_source=True)
-    done = project.make("--cores", "2")
-    assert done.returncode == 0, done.stderr
+    project.made = project.make("--cores", "2")
+    assert project.made.returncode == 0, project.made.stderr
     return project
 
 
@@ -388,7 +388,7 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     assert project.jobs_due() == {}
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_neither_shard_size_nor_order_nor_a_kill_changes_a_number(finished, tmp_path):
     """kill -9 to Snakemake and all its jobs, at the moment the first shard is there."""
     other = Project(tmp_path)
@@ -414,12 +414,10 @@ def test_neither_shard_size_nor_order_nor_a_kill_changes_a_number(finished, tmp_
     assert other.results(*DATA) == finished.results(*DATA)
 
 
-@pytest.mark.long
 def test_where_the_time_went_is_told(finished):
-    done = finished.make("--cores", "2", "--forcerun", "collect")
-    assert done.returncode == 0, done.stderr
+    done = finished.made
     assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
     assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
-    # Before it, how long it will take, of the four jobs that are due; and at last what to open.
-    assert len(re.findall(r"^stiffdice: tiny: 4 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
+    # Before it, how long it will take, of all jobs; and at last what to open.
+    assert len(re.findall(r"^stiffdice: tiny: 14 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
     assert done.stdout.splitlines()[-1] == f"open first: results/tiny/figures/books.svg ({TITLE})"
