@@ -232,7 +232,7 @@ def test_a_set_up_that_fails_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_an_interrupted_set_up_leaves_the_old_environment(due):
     project, old, new = due
     leads = project.venv.readlink()
@@ -247,7 +247,7 @@ def test_an_interrupted_set_up_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_of_two_set_ups_at_once_one_waits_for_what_the_other_started(due):
     """Pip goes on when its set-up is killed, and the next one lets it end."""
     project, _, new = due
@@ -273,7 +273,9 @@ def children(process: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
 
 
-@pytest.mark.parametrize("sign", [" ", "'", '"', "$", ";", "{", "}", "\n", "\t", "`", "&", "(", "\\", ":", "*"])
+@pytest.mark.parametrize(
+    "sign", [" ", "'", *(pytest.param(sign, marks=pytest.mark.broad) for sign in '"$;{}\n\t`&(\\:*')]
+)
 @pytest.mark.long
 def test_a_folder_that_snakemake_cannot_work_in_is_one_line_before_anything_is_done(tmp_path, sign):
     project = Project.new(tmp_path / f"my{sign}project")

@@ -27,7 +27,9 @@ CASES = [(kind, stiffness) for kind in SCENES for stiffness in ((1e2, 1e4) if ki
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), CASES)
-@pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-6])
+@pytest.mark.parametrize(
+    "error", [pytest.param(1e-1, marks=pytest.mark.broad), 1e-3, pytest.param(1e-6, marks=pytest.mark.broad)]
+)
 @pytest.mark.long
 def test_a_promise_is_kept(kind, stiffness, error):
     """By a run of twice the cost; where contacts are short, it is cheap at every stiffness."""

@@ -303,7 +303,7 @@ def test_help_and_imports_run():
         cases[name].prepare()()
 
 
-@pytest.mark.long
+@pytest.mark.broad
 @pytest.mark.workflow
 def test_the_jobs_of_a_sweep_run(monkeypatch):
     monkeypatch.chdir(ROOT)

@@ -311,7 +311,7 @@ def to_stranger(folder):
 
 @pytest.mark.parametrize("change", [to_link, to_stranger, lambda folder: folder.chmod(0o777)])
 @pytest.mark.parametrize("which", ["leaf", "parent"])
-@pytest.mark.parametrize("place", ["tmp", "home"])
+@pytest.mark.parametrize("place", ["tmp", pytest.param("home", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_a_folder_that_another_could_have_filled_is_not_used(tmp_path, change, which, place):
     if place == "tmp":

@@ -205,7 +205,7 @@ print(json.dumps({"left": left, "there": sorted(entry.name for entry in Path().i
 """
 
 
-@pytest.mark.parametrize("what", ["bytes", "dataset", "spool", "shard"])
+@pytest.mark.parametrize("what", ["bytes", "dataset", "spool", pytest.param("shard", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(undisturbed, tmp_path, what):
     (tmp_path / "config").symlink_to(undisturbed.folder / "config")

@@ -36,8 +36,8 @@ def extreme(kind, law):
 
 
 @pytest.mark.parametrize("kind", EXTREMES)
-@pytest.mark.parametrize("law", ["gated", "ungated"])
-@pytest.mark.parametrize(("steps", "share"), [(1, 1.0), (10_000, 0.1)])
+@pytest.mark.parametrize("law", ["gated", pytest.param("ungated", marks=pytest.mark.broad)])
+@pytest.mark.parametrize(("steps", "share"), [(1, 0.1), (10_000, 0.1), pytest.param(1, 1.0, marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps, share):
     """A few seconds of work, however the intervals are; of such a share of the budget."""
@@ -109,7 +109,7 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("kind", EXTREMES)
-@pytest.mark.parametrize("law", ["gated", "ungated"])
+@pytest.mark.parametrize("law", ["gated", pytest.param("ungated", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_advise_ends_soon_whatever_the_scene(kind, law):
     """With advice, for a part of the time at least, or by saying that it finds no path: by its patience, in seconds."""
@@ -134,7 +134,13 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("kind", LONG)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        kind if kind in ("event within an interval", "advise") else pytest.param(kind, marks=pytest.mark.broad)
+        for kind in LONG
+    ],
+)
 @pytest.mark.long
 def test_ctrl_c_ends_a_run_at_once(kind, tmp_path):
     ground = "stiffness: 1.0e+10, contact: gated"

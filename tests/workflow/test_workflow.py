@@ -264,9 +264,9 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
 @pytest.mark.parametrize(
     ("script", "due"),
     [
-        ("figure", {"figure": 4}),
-        ("table", {"table": 1}),
-        ("measure", {"experiment": 2, "timing": 1, "figure": 2}),
+        pytest.param("figure", {"figure": 4}, marks=pytest.mark.broad),
+        pytest.param("table", {"table": 1}, marks=pytest.mark.broad),
+        pytest.param("measure", {"experiment": 2, "timing": 1, "figure": 2}, marks=pytest.mark.broad),
         ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
@@ -333,7 +333,9 @@ def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
     ]
 
 
-@pytest.mark.parametrize("name", ["../x", "a b", "v1.5", "nowhere", ""])
+@pytest.mark.parametrize(
+    "name", ["../x", "nowhere", *(pytest.param(name, marks=pytest.mark.broad) for name in ("a b", "v1.5", ""))]
+)
 @pytest.mark.long
 def test_a_study_that_is_not_there_is_one_line(finished, name):
     done = run_module("snakemake", "-n", "study", "--config", f"study={name}", cwd=finished.folder)
