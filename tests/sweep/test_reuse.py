@@ -30,12 +30,12 @@ def folder(before, tmp_path):
 
 @pytest.fixture
 def extended(small):
-    """The sweep with a harder ground and more steps, a cell of it all the work of a job."""
+    """The sweep with a harder ground and more steps, in jobs of a few cells."""
     return dataclasses.replace(
         small,
         stiffness={"from": 1e2, "to": 10**3.5, "count": 4},
         omega_h=[small.omega_h, {"from": 0.5, "to": 0.4, "count": 3}],
-        seconds_per_job=1e-3,
+        seconds_per_job=4e-3,
     )
 
 
