@@ -124,6 +124,7 @@ def test_a_pilot_that_takes_too_long_ends_and_advice_with_it():
     assert check(advice, run_advised(advice, advice.best)).kept
 
 
+@pytest.mark.long
 def test_what_takes_too_long_is_no_option_where_another_scheme_knows_the_path():
     launch = {"position": [0, 0, 0.5177], "velocity": [0.3, 0, 0], "node_velocity": "rigid"}
     quiet = scene(stiffness=1e12, damping=2e3, friction=0, launch=launch)
@@ -134,6 +135,7 @@ def test_what_takes_too_long_is_no_option_where_another_scheme_knows_the_path():
     assert advise(quiet, 1e-6, scheme="exact").best.error < 1e-9
 
 
+@pytest.mark.long
 def test_methods_that_part_end_the_promise(monkeypatch):
     """Were LSODA another path, nothing would be promised from where it leaves ours."""
     honest = pilot_module._by_another_method

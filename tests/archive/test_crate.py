@@ -102,6 +102,7 @@ def test_the_validator_would_find_what_is_missing(archive, tmp_path):
     assert [message for message in demands.values() if message not in told] == []
 
 
+@pytest.mark.long
 def test_every_file_that_is_described_is_there_as_described(files, entities):
     described = [entity for entity in entities.values() if "File" in entity["@type"]]
     for entity in described:

@@ -118,6 +118,7 @@ def test_an_unknown_name_is_refused_before_any_work(capsys):
     assert "NAME = lissting: allowed is roof or listing" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_every_benchmark_says_what_it_measures_and_why_it_does_not(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # no Snakefile here
     cases, missing = gathered(list(BENCHMARKS), FULL)

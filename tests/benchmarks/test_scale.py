@@ -198,6 +198,7 @@ def test_what_cannot_be_measured_is_told_before_anything_is_made(tmp_path, monke
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_study_that_is_not_there_is_one_line():
     words = [sys.executable, "-m", "benchmarks.scale", "--study", "config/no.yaml"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)

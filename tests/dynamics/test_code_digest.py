@@ -74,6 +74,7 @@ def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, tou
     assert {module for module in EACH if code_digest(module) != after[module]} == touches
 
 
+@pytest.mark.long
 def test_imports_are_those_that_python_finds():
     for path in PACKAGE.rglob("*.py"):
         names = {PACKAGE.name}
@@ -122,6 +123,7 @@ def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     assert len(list((tmp_path / "cache" / "stiffdice").iterdir())) == 2
 
 
+@pytest.mark.long
 def test_a_home_that_cannot_be_written_is_no_hindrance(copy, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")

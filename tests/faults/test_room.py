@@ -193,6 +193,7 @@ for act in (lambda: write_dataset(whole, "out.h5"), spooled, lambda: open_file("
 """
 
 
+@pytest.mark.long
 def test_no_file_to_open_is_one_line_and_nothing_is_stored(tmp_path):
     command = [sys.executable, "-c", NO_MORE]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

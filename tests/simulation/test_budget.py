@@ -92,6 +92,7 @@ def test_an_engine_of_its_own_steps_has_a_budget_too():
     assert np.isfinite(run.trajectory.state["position"]).all()
 
 
+@pytest.mark.long
 def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.yaml").write_text("ground: {damping: 1.0e15, contact: gated}\n")

@@ -71,6 +71,7 @@ def test_an_extended_grid_computes_what_is_new_and_nothing_else(extended, small,
         assert path.read_bytes() == (folder / path.name).read_bytes()
 
 
+@pytest.mark.long
 def test_cells_of_later_rounds_are_kept_too(small, tmp_path, monkeypatch):
     refined = dataclasses.replace(small, omega_h={"from": 2.5, "to": 0.3, "count": 8}, refine=1)
     paths = rounds.compute(refined, tmp_path)

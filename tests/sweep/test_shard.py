@@ -55,6 +55,7 @@ def collected(planned, folder, **options):
     return collect([computed(planned, folder, **options)], planned.criteria)
 
 
+@pytest.mark.long
 def test_cells_do_not_know_their_shard(tmp_path):
     """However the columns are dealt out, the collected sweep is the same."""
     planned = small()
@@ -114,6 +115,7 @@ def test_a_run_that_left_the_range_of_doubles_fails_every_criterion(tmp_path):
     assert (found.verdicts[:, Verdict.LEFT_NUMERIC_RANGE] == planned.members).all()
 
 
+@pytest.mark.long
 def test_stopping_early_changes_no_judgement_and_saves_work(tmp_path):
     whole = collected(small(), tmp_path)
     stopped = collected(small(early_stop=True), tmp_path)

@@ -158,6 +158,7 @@ def test_both_laws_fail_above_the_linear_limit_and_pass_far_below_it(found):
     assert (found.steps_needed < 12 * found.limit).all()
 
 
+@pytest.mark.long
 def test_numbers_stay_finite_where_the_energy_does_not(shards):
     """Blowing up is not leaving the range of doubles: below the linear limit no run ends but by the criteria asked."""
     edges = stability_limits.find(collect(each(shards), {"finite": 0.0, "energy": 0.05}))
@@ -189,6 +190,7 @@ def test_edges_are_those_of_each_column(found, collected, plan):
         assert found.first_pass[k, c, s] == steps[failing == 0].min()
 
 
+@pytest.mark.long
 def test_a_tolerance_from_the_study_is_used_and_stored(lax):
     edges = stability_limits.find(lax)
     assert edges.tolerance.values.tolist() == [1e6, 0.02]

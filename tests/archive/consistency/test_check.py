@@ -222,6 +222,7 @@ def test_a_file_without_what_it_needs_is_told_in_one_line(sliding):
     assert sanity.problems(sliding.drop_vars("velocity"))
 
 
+@pytest.mark.long
 def test_shards_and_sweeps_can_be(shard, whole):
     assert {Verdict.PASSED, Verdict.ENERGY_GREW} <= set(np.unique(shard.verdict))
     for dataset, kind in ((shard, "shard"), (whole, "sweep"), (stability_limits.find(whole), "frontier")):
