@@ -53,7 +53,13 @@ def exact_nodes(scene):
 LOAD = {"load": {"at": "corner", "mass": 0.5}}
 
 
-@pytest.mark.parametrize("scheme", ORDERS)
+@pytest.mark.parametrize(
+    "scheme",
+    [
+        pytest.param(scheme, marks=pytest.mark.broad) if scheme in ("forward_euler", "implicit_euler") else scheme
+        for scheme in ORDERS
+    ],
+)
 def test_schemes_have_their_orders_without_torque(scheme):
     scene = afloat("[1, 2, -1] rad/s", **LOAD)
     best = exact_nodes(scene)

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import rounds
 from tests.conftest import each
 
 from stiffdice.io.cf_enums import meanings_of
@@ -233,3 +235,19 @@ def test_the_table_has_a_line_for_each_point(found):
     assert (law, criterion, float(tolerance), float(stiffness)) == ("ungated", "energy", 0.05, 100.0)
     assert float(limit) == 100.0
     assert float(first) == found.first_pass.values[UNGATED, ENERGY, 0]
+
+
+@pytest.mark.long
+def test_another_simulator_finds_the_same_edges(small, tmp_path):
+    """In a first bounce: in later ones round-off grows until it decides which member passes."""
+    scene, stiffness = dataclasses.replace(small.scene, duration=2.5), {"from": 1e3, "to": 1e3, "count": 1}
+    few = dataclasses.replace(small, scene=scene, contact=("ungated",), stiffness=stiffness)
+    found = {}
+    for simulator in (few.simulator, "numpy"):
+        (tmp_path / simulator).mkdir()
+        paths = rounds.compute(dataclasses.replace(few, simulator=simulator), tmp_path / simulator)
+        found[simulator] = stability_limits.find(collect(each(paths), few.criteria))
+    ours, theirs = found.values()
+    assert np.isfinite(ours.first_pass.values).all()
+    for name in ("first_pass", "last_fail", "flips"):
+        np.testing.assert_array_equal(theirs[name], ours[name])

@@ -366,7 +366,7 @@ def test_lint_finds_nothing(finished):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     """In the same study; what needs one that is not installed is left out with a line."""
     project, steps = Project(tmp_path), TINY["sweeps"]["steps"]

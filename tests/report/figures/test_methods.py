@@ -42,7 +42,7 @@ def lines_of(panel):
 
 
 @pytest.mark.parametrize("name", ["work-energy", "cost"])
-@pytest.mark.long
+@pytest.mark.broad
 def test_equal_data_give_equal_files(data, tmp_path, name):
     check_equal_files(name, {"flat": data["flat"]}, tmp_path)
 
