@@ -286,7 +286,7 @@ def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
     def tiny_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
