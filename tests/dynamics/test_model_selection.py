@@ -126,7 +126,7 @@ def test_a_lesser_model_is_the_full_one_to_round_off_in_many_scenes(count):
         else:
             early = slice(until_the_third_landing(scene, full))
             assert difference(less[early], full[early]) < 1e-11, (reason, scene)
-    assert min(found[name] for name in ("vertical", "sliding", "flying")) > count / 20
+    assert min(found[name] for name in ("vertical", "sliding", "flying")) > count / 25
     assert sum(found.values()) > count / 2
 
 

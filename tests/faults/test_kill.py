@@ -22,7 +22,7 @@ import pytest
 from stiffdice.io import host
 from stiffdice.io.writer import write_bytes
 
-FEW, KILLS = 2, int(os.environ.get("STIFFDICE_KILLS", "8"))
+FEW, KILLS = 1, int(os.environ.get("STIFFDICE_KILLS", "8"))
 SEED = int(os.environ.get("STIFFDICE_SEED", str(time.time_ns() % 10**6)))
 A_LIFE = 8  # kills before a life may go on to its end
 STARTING = 2.0  # seconds until Snakemake starts its first job, about
