@@ -230,11 +230,18 @@ def test_a_set_up_that_fails_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.broad
-def test_an_interrupted_set_up_leaves_the_old_environment(due):
+@pytest.mark.parametrize(
+    "ways",
+    [
+        pytest.param([signal.SIGKILL], marks=pytest.mark.long),
+        pytest.param([signal.SIGTERM, signal.SIGINT], marks=pytest.mark.broad),
+    ],
+    ids=["killed", "told to stop"],
+)
+def test_an_interrupted_set_up_leaves_the_old_environment(due, ways):
     project, old, new = due
     leads = project.venv.readlink()
-    for way in (signal.SIGTERM, signal.SIGINT, signal.SIGKILL):
+    for way in ways:
         started = project.start()
         wait_for(lambda: len(project.environments()) == 2)
         os.killpg(started.pid, way)
