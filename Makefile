@@ -1,4 +1,4 @@
-# stiffdice: `make paper` rebuilds the paper, `make test` runs all tests; both set themselves up.
+# stiffdice: `make paper` rebuilds the paper, `make test` tests each promise; both set themselves up.
 
 PYTHON ?= python3
 VENV := .venv
@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses shapes study status report archive bench sweep-million test test-fast test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,13 +69,16 @@ sweep-million: install  ## a sweep of 1e4, 1e5 and 1e6 runs, measured, into resu
 	@$(BIN)/python -m benchmarks.scale $(MILLION)
 
 # Where the environment says to keep no bytecode, each worker would prepare all tests, and each process compile all code.
-test test-fast: export PYTHONDONTWRITEBYTECODE =
+test test-fast test-all: export PYTHONDONTWRITEBYTECODE =
 
-test: install  ## run all tests
+test: install  ## run the tests: each promise once
+	@$(BIN)/python -m pytest -m "not broad"
+
+test-fast: install  ## run those of them that are short
+	@$(BIN)/python -m pytest -m "not broad and not long"
+
+test-all: install  ## run all tests, with many draws, faults and kills of a promise, as .ci/run does
 	@$(BIN)/python -m pytest
-
-test-fast: install  ## run the tests but for the broadest
-	@$(BIN)/python -m pytest -m "not long"
 
 test-slurm: install  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
 	@tests/slurm/run $(BIN)/python

@@ -164,7 +164,7 @@ time.sleep(600)
 
 @pytest.mark.long
 def test_a_study_that_is_being_made_keeps_its_environment(due):
-    project, old, new = due
+    project, old, _ = due
     holder = project.start(".venv/bin/python", "-c", HOLDING)
     holder.stdout.readline()
     leads = project.venv.readlink()
@@ -177,8 +177,6 @@ def test_a_study_that_is_being_made_keeps_its_environment(due):
     assert (project.venv.readlink(), project.version("tiny")) == (leads, old)
     holder.kill()
     holder.communicate()
-    assert project.call()[0] == 0
-    assert project.version("tiny") == new
 
 
 # As a process that has loaded a library.
@@ -232,11 +230,18 @@ def test_a_set_up_that_fails_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.long
-def test_an_interrupted_set_up_leaves_the_old_environment(due):
+@pytest.mark.parametrize(
+    "ways",
+    [
+        pytest.param([signal.SIGKILL], marks=pytest.mark.long),
+        pytest.param([signal.SIGTERM, signal.SIGINT], marks=pytest.mark.broad),
+    ],
+    ids=["killed", "told to stop"],
+)
+def test_an_interrupted_set_up_leaves_the_old_environment(due, ways):
     project, old, new = due
     leads = project.venv.readlink()
-    for way in (signal.SIGTERM, signal.SIGINT, signal.SIGKILL):
+    for way in ways:
         started = project.start()
         wait_for(lambda: len(project.environments()) == 2)
         os.killpg(started.pid, way)
@@ -247,7 +252,7 @@ def test_an_interrupted_set_up_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_of_two_set_ups_at_once_one_waits_for_what_the_other_started(due):
     """Pip goes on when its set-up is killed, and the next one lets it end."""
     project, _, new = due
@@ -273,7 +278,9 @@ def children(process: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
 
 
-@pytest.mark.parametrize("sign", [" ", "'", '"', "$", ";", "{", "}", "\n", "\t", "`", "&", "(", "\\", ":", "*"])
+@pytest.mark.parametrize(
+    "sign", [" ", "'", *(pytest.param(sign, marks=pytest.mark.broad) for sign in '"$;{}\n\t`&(\\:*')]
+)
 @pytest.mark.long
 def test_a_folder_that_snakemake_cannot_work_in_is_one_line_before_anything_is_done(tmp_path, sign):
     project = Project.new(tmp_path / f"my{sign}project")

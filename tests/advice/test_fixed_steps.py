@@ -25,6 +25,7 @@ def test_extrapolated_steps_keep_the_error_too(scheme, stiffness, budget):
     assert pilot.error(run)[-1] <= 1e-3
 
 
+@pytest.mark.long
 def test_a_measured_fixed_step_is_its_own_error():
     problem = scene(stiffness=100)
     advice = advise(problem, 0.05, scheme="rk4")

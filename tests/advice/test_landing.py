@@ -56,10 +56,13 @@ def compared(numbers: range, error: float, throws: int) -> tuple[float, int]:
     return total, 5 * len(numbers)
 
 
-@pytest.mark.long
-def test_the_promise_holds_for_fifty_dice_that_it_has_not_seen():
-    """As far as so many throws can tell: an average total variation of 0.01 would be seen."""
-    chi_square, freedom = compared(range(50), 0.003, 4_000)
+@pytest.mark.parametrize(
+    ("dice", "throws"),
+    [pytest.param(4, 2_000, marks=pytest.mark.long), pytest.param(50, 4_000, marks=pytest.mark.broad)],
+)
+def test_the_promise_holds_for_dice_that_it_has_not_seen(dice, throws):
+    """As far as so many throws can tell: of fifty dice an average total variation of 0.01 would be seen."""
+    chi_square, freedom = compared(range(dice), 0.003, throws)
     assert chi_square < freedom + 4 * np.sqrt(2 * freedom)
 
 

@@ -27,7 +27,9 @@ CASES = [(kind, stiffness) for kind in SCENES for stiffness in ((1e2, 1e4) if ki
 
 
 @pytest.mark.parametrize(("kind", "stiffness"), CASES)
-@pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-6])
+@pytest.mark.parametrize(
+    "error", [pytest.param(1e-1, marks=pytest.mark.broad), 1e-3, pytest.param(1e-6, marks=pytest.mark.broad)]
+)
 @pytest.mark.long
 def test_a_promise_is_kept(kind, stiffness, error):
     """By a run of twice the cost; where contacts are short, it is cheap at every stiffness."""
@@ -93,11 +95,17 @@ def test_outside_the_studied_range_is_said(change, told):
 
 @pytest.mark.long
 def test_where_nothing_touches_the_parabola_is_all():
-    advice = advise(scene(duration=0.5), 1e-9, scheme="event")
-    assert advice.model == "flying"
-    assert (advice.best.evaluations, advice.landings) == (0, 0)
-    (verlet,) = advise(scene(duration=0.5), 1e-9, scheme="velocity_verlet").options
+    advice = advise(scene(duration=0.5), 1e-9, scheme="velocity_verlet")
+    (verlet,) = advice.options
+    assert (advice.model, advice.landings) == ("flying", 0)
     assert (verlet.keeps, verlet.steps, verlet.margin) == (True, SAMPLES, None)
+
+
+@pytest.mark.broad
+def test_where_nothing_touches_event_costs_nothing():
+    """A kernel of its own, for this alone."""
+    advice = advise(scene(duration=0.5), 1e-9, scheme="event")
+    assert (advice.model, advice.best.evaluations, advice.landings) == ("flying", 0, 0)
 
 
 @pytest.mark.parametrize(("text", "value"), [("1%", 0.01), (" 0.5 % ", 0.005), ("1e-6", 1e-6), ("1", 1.0)])
@@ -122,6 +130,7 @@ def test_a_pilot_that_takes_too_long_ends_and_advice_with_it():
     assert check(advice, run_advised(advice, advice.best)).kept
 
 
+@pytest.mark.long
 def test_what_takes_too_long_is_no_option_where_another_scheme_knows_the_path():
     launch = {"position": [0, 0, 0.5177], "velocity": [0.3, 0, 0], "node_velocity": "rigid"}
     quiet = scene(stiffness=1e12, damping=2e3, friction=0, launch=launch)
@@ -132,6 +141,7 @@ def test_what_takes_too_long_is_no_option_where_another_scheme_knows_the_path():
     assert advise(quiet, 1e-6, scheme="exact").best.error < 1e-9
 
 
+@pytest.mark.long
 def test_methods_that_part_end_the_promise(monkeypatch):
     """Were LSODA another path, nothing would be promised from where it leaves ours."""
     honest = pilot_module._by_another_method

@@ -157,12 +157,14 @@ def rewritten(path, run, **values):
     write_dataset(changed, path)
 
 
+@pytest.mark.long
 def test_equal_files_are_the_same(pair):
     found = compare(*pair)
     assert found.same
     assert found.lines() == ["the same, byte for byte: 1 file"]
 
 
+@pytest.mark.long
 def test_one_bit_is_found(pair, run):
     value = run["position"].values[25, 2]
     rewritten(pair[1], run, position=((25, 2), np.nextafter(value, np.inf)))
@@ -182,6 +184,7 @@ def test_one_bit_is_found(pair, run):
     assert lines[4] == f"    at time = 2.5 s, axis z: {place.a} against {place.b}"
 
 
+@pytest.mark.long
 def test_kinds_are_told_in_words(pair, run):
     rewritten(pair[0], run, velocity=((3, 0), 0.0), position=((4, 1), np.nan), verdict=((), 0))
     rewritten(pair[1], run, velocity=((3, 0), -0.0), position=((4, 1), 1.0), verdict=((), 1))
@@ -205,6 +208,7 @@ def change(path, **attributes):
     seal.seal(path)
 
 
+@pytest.mark.long
 def test_equal_numbers_are_told_although_attributes_differ(pair, run):
     scene = json.loads(run.attrs["scene"])
     scene["ground"]["stiffness"] = 5.0
@@ -234,11 +238,13 @@ def test_equal_numbers_are_told_although_attributes_differ(pair, run):
     assert lines[-1] == "title: only in A: A thrown cube (1 file)"
 
 
+@pytest.mark.long
 def test_readers_do_not_read_a_difference_into_a_single_number(pair):
     change(pair[1], steps=np.array([1000], np.int32))
     assert compare(*pair).same
 
 
+@pytest.mark.long
 def test_other_storage_is_no_difference(pair, run):
     encoding = {name: {"_FillValue": None} for name in run.variables}
     encoding["position"]["chunksizes"] = (5, 1)
@@ -249,6 +255,7 @@ def test_other_storage_is_no_difference(pair, run):
     assert found.lines() == ["the same numbers and attributes, stored otherwise: 1 file, 0 of them byte for byte"]
 
 
+@pytest.mark.long
 def test_variables_types_and_sizes_are_told(pair, run):
     other = run.drop_vars("energy_paper").assign(step=run["step"].astype(np.int32))
     write_dataset(other.isel(time=slice(50)), pair[1])
@@ -262,6 +269,7 @@ def test_variables_types_and_sizes_are_told(pair, run):
     assert "  compared at the 50 places along time that both have" in lines
 
 
+@pytest.mark.long
 def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
     thinned = run.isel(time=slice(None, None, 2)).copy(deep=True)
     thinned["position"].values[25, 2] = 7.0
@@ -272,6 +280,7 @@ def test_values_are_compared_at_the_times_that_both_files_have(pair, run):
     assert any(line.startswith("    at time = 5 s, axis z: ") for line in lines)
 
 
+@pytest.mark.long
 def test_json_has_all(pair, run):
     rewritten(pair[1], run, position=((25, 2), np.nan))
     told = json.loads(compare(*pair).as_json(), parse_constant=pytest.fail)
@@ -282,6 +291,7 @@ def test_json_has_all(pair, run):
     assert (values["count"], values["of"], values["unmeasured"], values["ulp"]) == (1, 303, 1, None)
 
 
+@pytest.mark.long
 def test_json_has_no_infinite_numbers(pair, run):
     rewritten(pair[0], run, position=((25, 2), -1.7e308))
     rewritten(pair[1], run, position=((25, 2), 1.7e308))
@@ -301,6 +311,7 @@ def test_nothing_is_compared_along_a_dimension_of_two_sizes_that_has_no_labels()
     assert found.notes == ("not compared along bounce: its sizes differ, and its places have no labels",)
 
 
+@pytest.mark.long
 def test_text_of_files_does_not_command_a_terminal(pair):
     change(pair[1], title="\x1b[2Jgone")
     with pytest.raises(RefusedError) as caught:
@@ -347,6 +358,7 @@ def test_how_cells_are_dealt_is_no_difference(results):
     assert not compare(results[0].parent, results[1]).same  # one level up nothing fits
 
 
+@pytest.mark.long
 def test_one_run_is_found_among_cells_dealt_otherwise(results):
     shards = sorted((results[1] / "sweeps" / "grid" / "shards").iterdir())
     with xr.open_dataset(shards[0]) as dataset:
@@ -366,6 +378,7 @@ def test_one_run_is_found_among_cells_dealt_otherwise(results):
         assert repr(float(dataset["energy_ratio"][3, 0])) == place.b
 
 
+@pytest.mark.long
 def test_a_missing_shard_is_missing_cells(results):
     shards = sorted((results[1] / "sweeps" / "grid" / "shards").iterdir())
     shards[0].unlink()
@@ -375,6 +388,7 @@ def test_a_missing_shard_is_missing_cells(results):
     assert found.lines()[0] == "different: cells only in A in 1 file"
 
 
+@pytest.mark.long
 def test_a_damaged_shard_is_named(results):
     shards = sorted((results[1] / "sweeps" / "grid" / "shards").iterdir())
     image = bytearray(shards[0].read_bytes())
@@ -387,6 +401,7 @@ def test_a_damaged_shard_is_named(results):
     assert str(results[1]) not in text
 
 
+@pytest.mark.long
 def test_files_of_folders_that_differ_are_tried_in_another_process_first(results, monkeypatch):
     tried = []
     honest = isolation.refused
@@ -396,6 +411,7 @@ def test_files_of_folders_that_differ_are_tried_in_another_process_first(results
     assert sorted(tried) == sorted(shards)
 
 
+@pytest.mark.long
 def test_single_shards_are_compared_by_cell(results, tmp_path):
     shard = min((results[0] / "sweeps" / "grid" / "shards").iterdir())
     with xr.open_dataset(shard, decode_times=False) as dataset:
@@ -408,6 +424,7 @@ def test_single_shards_are_compared_by_cell(results, tmp_path):
     assert difference.only_a[0].endswith(alone)
 
 
+@pytest.mark.long
 def test_shards_of_an_earlier_grid_are_left_out(results):
     folder = results[0] / "sweeps" / "grid" / "shards"
     shutil.copy(min(folder.iterdir()), folder / "0123456789ab.h5")
@@ -416,6 +433,7 @@ def test_shards_of_an_earlier_grid_are_left_out(results):
     assert found.left_out == ("sweeps/grid/shards/0123456789ab.h5",)
 
 
+@pytest.mark.long
 def test_verdicts_that_changed_are_told_in_the_fields_words(results):
     shard = min((results[1] / "sweeps" / "grid" / "shards").iterdir())
     with xr.open_dataset(shard) as dataset:
@@ -524,6 +542,7 @@ def test_only_so_much_is_shown(studies):
     assert len(json.loads(compare(*studies).as_json())["only_a"]) == 30
 
 
+@pytest.mark.long
 def test_archives_are_compared_by_what_is_in_them(studies, run, tmp_path):
     rewritten(studies[1] / "runs" / "throw.h5", run, position=((25, 2), 7.0))
     archives = []

@@ -66,7 +66,7 @@ def test_the_validator_finds_nothing_that_is_required_or_that_we_could_say(archi
     assert told["RECOMMENDED"] - without_address == NOT_OURS
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_with_an_address_and_an_agent_only_the_publisher_is_left_to_say(finished, tmp_path):
     folder = tmp_path / "project"
     shutil.copytree(finished[0], folder, symlinks=True)
@@ -81,7 +81,7 @@ def test_with_an_address_and_an_agent_only_the_publisher_is_left_to_say(finished
     assert "publisher" in publisher
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_validator_would_find_what_is_missing(archive, tmp_path):
     """Of every profile one demand, so that a validator that checks nothing is noticed."""
     demands = {
@@ -102,6 +102,7 @@ def test_the_validator_would_find_what_is_missing(archive, tmp_path):
     assert [message for message in demands.values() if message not in told] == []
 
 
+@pytest.mark.long
 def test_every_file_that_is_described_is_there_as_described(files, entities):
     described = [entity for entity in entities.values() if "File" in entity["@type"]]
     for entity in described:

@@ -305,6 +305,7 @@ def test_no_change_to_a_zip_file_makes_a_file_elsewhere_or_a_crash(tmp_path_fact
     assert not any(place.is_symlink() for place in (top / "out").rglob("*"))
 
 
+@pytest.mark.long
 def test_names_that_are_nothing_but_folders_are_refused_at_once(tmp_path):
     """500 names of 505 parts stand for 250,000 folders; 10,001 flat ones are too many, too."""
     deep = {f"{number}/{'a/' * 503}x": b"" for number in range(500)}

@@ -261,6 +261,7 @@ def test_the_command_packs_and_says_what_a_run_takes(finished, tmp_path, monkeyp
     assert told["kinds"]["data"]["bytes"] == sum(data)
 
 
+@pytest.mark.long
 def test_an_archive_lies_where_no_study_does_unless_one_says_otherwise(own, monkeypatch, capsys):
     monkeypatch.chdir(own[0])
     assert main(["archive", "tiny"]) == 0
@@ -292,6 +293,7 @@ def test_bad_arguments_are_told_in_one_line(finished, monkeypatch, capsys, argum
     assert re.search(told, line)
 
 
+@pytest.mark.long
 def test_an_archive_replaces_an_archive_and_another_zip_only_by_force(finished, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(finished[0])
     target = tmp_path / "a.zip"

@@ -291,11 +291,11 @@ def all_of(running: psutil.Popen, name: str) -> list[psutil.Process]:
 @pytest.mark.parametrize(
     ("words", "number", "status"),
     [
-        pytest.param([], signal.SIGHUP, 129, marks=sandboxes.needed),
+        pytest.param([], signal.SIGHUP, 129, marks=[sandboxes.needed, pytest.mark.broad]),
         pytest.param([], signal.SIGTERM, 143, marks=sandboxes.needed),
-        pytest.param([], signal.SIGINT, 130, marks=sandboxes.needed),
-        pytest.param([], signal.SIGKILL, -9, marks=sandboxes.needed),
-        (["--no-sandbox"], signal.SIGTERM, 143),
+        pytest.param([], signal.SIGINT, 130, marks=[sandboxes.needed, pytest.mark.broad]),
+        pytest.param([], signal.SIGKILL, -9, marks=[sandboxes.needed, pytest.mark.broad]),
+        pytest.param(["--no-sandbox"], signal.SIGTERM, 143, marks=pytest.mark.broad),
         (["--no-sandbox"], signal.SIGKILL, -9),
     ],
 )

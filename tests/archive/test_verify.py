@@ -134,6 +134,7 @@ def test_a_folder_of_results_is_checked_as_far_as_it_can_be(folder):
     assert failing(verify(folder / RUN)) == {"fall.h5"}
 
 
+@pytest.mark.long
 def test_a_changed_a_missing_and_an_additional_file_are_named(light):
     (light / "read me.txt").write_text("Hello\n")
     (light / "src" / "sitecustomize.py").unlink()
@@ -222,6 +223,7 @@ def test_a_missing_shard_is_named(folder):
     assert failing(report) == {path.relative_to(folder).as_posix()}
 
 
+@pytest.mark.long
 def test_shards_of_another_sweep_do_not_add_up(folder):
     one, other = sorted((folder / SWEEP / "shards").iterdir())
     dataset = open_file(one)
@@ -286,6 +288,7 @@ def test_a_zip_file_that_is_no_archive_or_leads_elsewhere_is_refused(tmp_path, c
             verify(tmp_path / name)
 
 
+@pytest.mark.long
 def test_the_command_says_it_for_programs_and_for_scripts(light, capsys):
     assert main(["verify", str(light), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["ok"] is True
@@ -313,6 +316,7 @@ def test_the_last_line_says_what_could_not_be_checked(file, words):
     assert report.ok and report.lines()[-1] == f"nothing fails; not checked: {words}"
 
 
+@pytest.mark.long
 def test_results_of_which_no_log_tells_are_counted(folder):
     assert NO_LOGS in verify(folder / "results/tiny").lines()[-1]
     log = folder / "results/tiny/logs/trajectory/fall.log"

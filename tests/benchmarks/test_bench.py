@@ -52,7 +52,7 @@ def bench(last):
     return open_file(last)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_every_row_has_unit_median_spread_and_what_holds_it_back(bench):
     rows = {row.name: row for row in rows_of(bench)}
     assert {"cycle", "fma_peak", *(f"latency_{name}" for name in LATENCIES)} <= set(rows)
@@ -76,7 +76,7 @@ def test_every_row_has_unit_median_spread_and_what_holds_it_back(bench):
             assert row.share > 0
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_no_limit_is_beyond_any_processor(bench):
     """The calls do the work they are said to do: a busy machine makes them slower, but nothing makes them faster."""
     assert 1 / best_of(bench, "cycle") < 1e10
@@ -84,7 +84,7 @@ def test_no_limit_is_beyond_any_processor(bench):
     assert all(1 / best_of(bench, f"latency_{name}") < 1e10 for name in LATENCIES)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_table_for_programs_has_the_same_rows(bench, last):
     rows = list(csv.DictReader(io.StringIO(last.with_suffix(".csv").read_text())))
     assert [row["case"] for row in rows] == [row.name for row in rows_of(bench)]
@@ -93,7 +93,7 @@ def test_the_table_for_programs_has_the_same_rows(bench, last):
         assert told["limited_by"] == row.limited_by
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_file_says_what_it_was_measured_with(bench):
     assert bench.attrs["Conventions"].startswith("CF-")
     assert bench.attrs["vector_width"] == vector_width()
@@ -105,7 +105,7 @@ def test_the_file_says_what_it_was_measured_with(bench):
         assert variable.attrs["long_name"]
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_second_bench_is_compared_with_the_first(last):
     page = last.with_suffix(".md").read_text()
     assert "## Since 2026-01-01T000000Z-quick" in page
@@ -118,6 +118,7 @@ def test_an_unknown_name_is_refused_before_any_work(capsys):
     assert "NAME = lissting: allowed is roof or listing" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_every_benchmark_says_what_it_measures_and_why_it_does_not(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # no Snakefile here
     cases, missing = gathered(list(BENCHMARKS), FULL)
@@ -303,7 +304,7 @@ def test_help_and_imports_run():
         cases[name].prepare()()
 
 
-@pytest.mark.long
+@pytest.mark.broad
 @pytest.mark.workflow
 def test_the_jobs_of_a_sweep_run(monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -324,7 +325,7 @@ def test_the_throw_in_octave_is_the_throw():
     np.testing.assert_allclose(place, states[-1]["position"], rtol=1e-9)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_what_a_file_holds_can_be_looked_at(last, capsys):
     assert main(["inspect", str(last)]) == 0
     told = capsys.readouterr().out

@@ -39,8 +39,13 @@ def operations(assembly):
     return loops[start, end]
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("model", "contact"), FLOPS)
+@pytest.mark.parametrize(
+    ("model", "contact"),
+    [
+        pytest.param(*which, marks=pytest.mark.long if which == ("sliding", "ungated") else pytest.mark.broad)
+        for which in FLOPS
+    ],
+)
 def test_operations_are_those_of_the_compiled_loop(model, contact, monkeypatch):
     # What comes from the cache has no assembly.
     loop = numba.njit(batch_loop._march.py_func, error_model="numpy", fastmath=False)

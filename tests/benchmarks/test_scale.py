@@ -118,19 +118,25 @@ def million(folder: Path, study: Path) -> list[str]:
     return [sys.executable, "-m", "benchmarks.scale", "--study", str(study), *asked]
 
 
-@pytest.fixture(scope="module")
-def killed_once(tmp_path_factory):
-    """A small size, measured by a command that was killed when its shards were done, and then called again."""
-    folder = tmp_path_factory.mktemp("scale")
-    study = folder / "few.yaml"
-    study.write_text(FEW)
+def killed(folder: Path, study: Path) -> dict[Path, int]:
+    """Start to measure, kill that when all shards are done, and return their files and times."""
     first = subprocess.Popen(million(folder, study), cwd=ROOT, stderr=subprocess.DEVNULL)
     while not (folder / "project/results/runs-320/logs/collect/sliding.log").exists():
         assert first.poll() is None
         time.sleep(0.05)
     first.send_signal(signal.SIGKILL)
     first.wait()
-    kept = {path: path.stat().st_mtime_ns for path in folder.glob("project/results/runs-320/sweeps/*/shards/*.h5")}
+    return {path: path.stat().st_mtime_ns for path in folder.glob("project/results/runs-320/sweeps/*/shards/*.h5")}
+
+
+@pytest.fixture(scope="module", params=[0, pytest.param(1, marks=pytest.mark.broad)], ids=["at once", "killed once"])
+def measured(request, tmp_path_factory):
+    """A small size, measured at once, or by a command that was killed before."""
+    folder = tmp_path_factory.mktemp("scale")
+    study = folder / "few.yaml"
+    study.write_text(FEW)
+    kept = killed(folder, study) if request.param else {}
+    assert len(kept) >= request.param
     done = subprocess.run(million(folder, study), cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return folder, kept
@@ -138,18 +144,17 @@ def killed_once(tmp_path_factory):
 
 @pytest.mark.long
 @pytest.mark.workflow
-def test_an_interrupted_measurement_goes_on_where_it_was(killed_once):
-    folder, kept = killed_once
-    assert kept
+def test_an_interrupted_measurement_goes_on_where_it_was(measured):
+    folder, kept = measured
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
     record = json.loads((folder / "record.json").read_text())
-    assert record["runs-320"]["sessions"] == 2
+    assert record["runs-320"]["sessions"] == 1 + bool(kept)
 
 
 @pytest.mark.long
 @pytest.mark.workflow
-def test_the_table_says_what_the_files_say(killed_once, monkeypatch):
-    folder, _ = killed_once
+def test_the_table_says_what_the_files_say(measured, monkeypatch):
+    folder, _ = measured
     monkeypatch.chdir(ROOT)
     told = {
         (int(row["runs"]), row["quantity"]): float(row["value"])
@@ -174,8 +179,8 @@ def test_the_table_says_what_the_files_say(killed_once, monkeypatch):
 
 @pytest.mark.long
 @pytest.mark.workflow
-def test_what_is_measured_is_told_again_and_not_made_again(killed_once):
-    folder, _ = killed_once
+def test_what_is_measured_is_told_again_and_not_made_again(measured):
+    folder, _ = measured
     page = (folder / "scale.md").read_text()
     before = {path: path.stat().st_mtime_ns for path in (folder / "project" / "results").rglob("*")}
     done = subprocess.run(million(folder, folder / "few.yaml"), cwd=ROOT, capture_output=True, text=True, check=True)
@@ -198,6 +203,7 @@ def test_what_cannot_be_measured_is_told_before_anything_is_made(tmp_path, monke
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_study_that_is_not_there_is_one_line():
     words = [sys.executable, "-m", "benchmarks.scale", "--study", "config/no.yaml"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -173,6 +173,7 @@ def test_inspect_tells_verdict_scene_and_units(stiffdice):
     assert "trajectory_error" not in out  # it was not compared with anything
 
 
+@pytest.mark.long
 def test_auto_says_which_model_and_why_and_stores_it(stiffdice):
     options = ["--model", "auto", "--set", "launch.velocity=[0, 0, 5]", "--steps", "20000", "--ledger", "-o", "out.h5"]
     status, out, err, _ = stiffdice("run", SCENE, *options)
@@ -274,6 +275,7 @@ def test_the_same_command_gives_the_same_bytes(tmp_path):
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
+@pytest.mark.long
 def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
     def small_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
@@ -284,7 +286,7 @@ def test_a_disk_that_fills_up_is_one_line_and_no_file(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_a_disk_with_no_room_for_the_compiled_kernel_is_one_line(tmp_path):
     def tiny_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))

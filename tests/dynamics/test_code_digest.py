@@ -74,6 +74,7 @@ def test_a_change_shows_in_what_stands_on_it_and_nowhere_else(copy, changed, tou
     assert {module for module in EACH if code_digest(module) != after[module]} == touches
 
 
+@pytest.mark.long
 def test_imports_are_those_that_python_finds():
     for path in PACKAGE.rglob("*.py"):
         names = {PACKAGE.name}
@@ -101,8 +102,13 @@ print(energies(physics_of(scene), start_of(scene, "sliding"))[2][0])
 """
 
 
-@pytest.mark.parametrize("first", ["", "import numba\n"], ids=["", "numba imported before"])
-@pytest.mark.long
+@pytest.mark.parametrize(
+    "first",
+    [
+        pytest.param("", id="", marks=pytest.mark.long),
+        pytest.param("import numba\n", id="numba imported before", marks=pytest.mark.broad),
+    ],
+)
 def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     """Numba itself would not notice: the kernel that is cached lies in another file."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -117,6 +123,7 @@ def test_an_edited_file_is_never_served_from_the_cache(copy, tmp_path, first):
     assert len(list((tmp_path / "cache" / "stiffdice").iterdir())) == 2
 
 
+@pytest.mark.long
 def test_a_home_that_cannot_be_written_is_no_hindrance(copy, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")

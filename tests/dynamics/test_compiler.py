@@ -18,7 +18,7 @@ from tests.forks import run_code
 from stiffdice.dynamics.compiler import KernelFiles
 
 ROOT = Path(__file__).parents[2]
-KERNEL = {"code": bytes(range(256))}
+KERNEL = {"code": bytes(range(32))}
 
 
 class Bomb:
@@ -113,6 +113,27 @@ def test_processes_that_write_at_once_read_whole_kernels_or_none(kernels, tmp_pa
     assert {path.name for path in tmp_path.iterdir()} == names
 
 
+# A kernel that compiles quickly, and what it says.
+ENERGY = """
+from stiffdice.dynamics.energy import energies
+from stiffdice.dynamics.state import physics_of, start_of
+from stiffdice.scene.scene import from_mapping
+scene = from_mapping({})
+print(energies(physics_of(scene), start_of(scene, "sliding")))
+"""
+HITS = "print(next(iter(energies.dispatcher.stats.cache_hits.values()), 0))"
+
+
+def energies(cache, prefix=(), source=ROOT / "src"):
+    """Return what the kernel says in a process of its own, and how often it was found stored."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(source)}
+    command = [*prefix, sys.executable, "-c", ENERGY + HITS]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said, hits = done.stdout.splitlines()
+    return said, int(hits)
+
+
 def run(folder, out, prefix=(), **changes):
     scene = ["config/scenes/figure-09.yaml", "--model", "vertical", "--every", "5000"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")} | changes
@@ -159,7 +180,24 @@ def made_a_folder(path, whole, rng):
     path.mkdir()
 
 
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A folder with the one kernel, and what that says."""
+    folder = tmp_path_factory.mktemp("stored")
+    return folder, energies(folder / "cache")[0]
+
+
+@pytest.mark.parametrize("damage", [flipped, made_a_folder])
 @pytest.mark.long
+def test_a_damaged_kernel_is_compiled_again_and_says_the_same(stored, damage):
+    folder, said = stored
+    ((path, whole),) = cached(folder).items()
+    damage(path, whole, np.random.default_rng(15))
+    assert energies(folder / "cache") == (said, 0)
+    assert energies(folder / "cache") == (said, 1)
+
+
+@pytest.mark.broad
 def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled):
     """Each kernel damaged in its own way."""
     folder, first = compiled
@@ -176,6 +214,12 @@ def test_a_run_on_damaged_kernels_gives_the_same_bytes_and_heals_them(compiled):
 
 
 @pytest.mark.long
+def test_a_kernel_that_cannot_be_stored_serves_its_process(stored, tmp_path):
+    assert energies(tmp_path, ["prlimit", "--fsize=5000"]) == (stored[1], 0)
+    assert not list(tmp_path.rglob("*.nbc"))
+
+
+@pytest.mark.broad
 def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
     """No file of this process may be as long."""
     _, first = compiled
@@ -183,26 +227,12 @@ def test_kernels_that_cannot_be_stored_serve_the_run(compiled, tmp_path):
     assert not list(tmp_path.rglob("*.nbc"))
 
 
-ENERGY = """
-from stiffdice.dynamics.energy import energies
-from stiffdice.dynamics.state import physics_of, start_of
-from stiffdice.scene.scene import from_mapping
-scene = from_mapping({})
-energies(physics_of(scene), start_of(scene, "sliding"))
-print(next(iter(energies.dispatcher.stats.cache_hits.values()), 0))
-"""
-
-
 @pytest.mark.long
-def test_a_copy_of_the_project_finds_its_kernels(tmp_path):
+def test_a_copy_of_the_project_finds_its_kernels(stored, tmp_path):
     """They are known by the digest of what they stand on, not by where that lies."""
     shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("__pycache__"))
-    hits = []
-    for source in (ROOT / "src", tmp_path / "src"):
-        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(source)}
-        command = [sys.executable, "-c", ENERGY]
-        hits.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip())
-    assert hits == ["0", "1"]
+    folder, said = stored
+    assert energies(folder / "cache", source=tmp_path / "src") == (said, 1)
 
 
 TOGETHER = """
@@ -219,22 +249,31 @@ def save(self, key, kernel):
     store(self, key, kernel)
 
 compiler.KernelFiles.save = save
+"""
+RUN = """
 run = simulate(from_mapping({}), model="vertical", steps=10, every=1)
 print(float(run.trajectory.state["position"][-1, 2]).hex())
 """
 
 
-@pytest.mark.long
-def test_what_one_process_compiles_another_waits_for(tmp_path):
-    """Two processes, each with a helper of its own, make each of the five kernels of a run once, and agree."""
+@pytest.mark.parametrize(
+    ("what", "count"),
+    [
+        pytest.param(ENERGY, 1, marks=pytest.mark.long),
+        pytest.param(RUN, 5, marks=pytest.mark.broad),
+    ],
+    ids=["kernel", "run"],
+)
+def test_what_one_process_compiles_another_waits_for(tmp_path, what, count):
+    """Two processes make each kernel once, and agree; of a run each has a helper of its own."""
     environment, saved = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "saved"
-    command = [sys.executable, "-c", TOGETHER, str(saved)]
+    command = [sys.executable, "-c", TOGETHER + what, str(saved)]
     started = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    heights = {process.communicate()[0] for process in started}
+    said = {process.communicate()[0] for process in started}
     assert [process.returncode for process in started] == [0, 0]
-    assert len(heights) == 1
+    assert len(said) == 1
     kernels = saved.read_text().splitlines()
-    assert len(kernels) == len(set(kernels)) == 5
+    assert len(kernels) == len(set(kernels)) == count
     assert {path.name for path in tmp_path.rglob("*.nbc")} == set(kernels)
 
 
@@ -272,7 +311,7 @@ def to_stranger(folder):
 
 @pytest.mark.parametrize("change", [to_link, to_stranger, lambda folder: folder.chmod(0o777)])
 @pytest.mark.parametrize("which", ["leaf", "parent"])
-@pytest.mark.parametrize("place", ["tmp", "home"])
+@pytest.mark.parametrize("place", ["tmp", pytest.param("home", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_a_folder_that_another_could_have_filled_is_not_used(tmp_path, change, which, place):
     if place == "tmp":

@@ -87,6 +87,7 @@ def stepped(scene, steps, gated):
 
 @pytest.mark.parametrize("contact", ["ungated", "gated"])
 @pytest.mark.parametrize("normal", [[0, 0, 1], [0.3, -0.1, 1.0]], ids=["flat", "slope"])
+@pytest.mark.long
 def test_a_throw_against_a_second_implementation(contact, normal):
     scene = from_mapping(
         {

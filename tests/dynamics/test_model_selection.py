@@ -102,15 +102,17 @@ def cancels_to_the_last_bit(scene, model):
     return upright and (scene.ground.friction == 0 or model == "vertical")
 
 
-@pytest.mark.long
-def test_a_lesser_model_is_the_full_one_to_round_off_in_thousands_of_scenes():
+@pytest.mark.parametrize(
+    "count", [pytest.param(500, marks=pytest.mark.long), pytest.param(5000, marks=pytest.mark.broad)]
+)
+def test_a_lesser_model_is_the_full_one_to_round_off_in_many_scenes(count):
     """To the last bit where torques cancel to the last bit; elsewhere for two bounces, before round-off grows large.
 
     Not asked here is what friction makes of that round-off: the next test.
     """
     rng = np.random.default_rng(7)
     found = dict.fromkeys(MODELS, 0)
-    for _ in range(5000):
+    for _ in range(count):
         scene, steps = drawn(rng)
         name, reason = least_model(scene, scene.duration / steps)
         exact = cancels_to_the_last_bit(scene, name)
@@ -124,8 +126,8 @@ def test_a_lesser_model_is_the_full_one_to_round_off_in_thousands_of_scenes():
         else:
             early = slice(until_the_third_landing(scene, full))
             assert difference(less[early], full[early]) < 1e-11, (reason, scene)
-    assert min(found[name] for name in ("vertical", "sliding", "flying")) > 250
-    assert sum(found.values()) > 2500
+    assert min(found[name] for name in ("vertical", "sliding", "flying")) > count / 25
+    assert sum(found.values()) > count / 2
 
 
 @pytest.mark.parametrize("contact", ["ungated", "gated"])

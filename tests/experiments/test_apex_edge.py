@@ -32,6 +32,7 @@ def test_the_edge_is_the_predicted_one_whatever_the_duration(found):
     assert (found.last_fail.values < 1.25 * predicted).all()
 
 
+@pytest.mark.long
 def test_as_listed_lower_rebounds_need_shorter_steps_and_as_written_they_do_not(found):
     listed, written = found.predicted.values
     assert listed[0] < 0.6

@@ -56,6 +56,7 @@ def test_the_map_is_what_bare_stepping_gives(measured):
     np.testing.assert_allclose(measured.energy_gain, wanted, rtol=0, atol=1e-11)
 
 
+@pytest.mark.long
 def test_no_bounce_gains_or_loses_more_than_the_bounds(measured):
     square = measured.omega_h**2 / 4
     assert (measured.energy_gain <= 1 / (1 - square) - 1 + 1e-11).all()
@@ -137,6 +138,7 @@ def test_with_gravity_a_magic_step_is_off_by_the_time_that_weight_adds(stiffness
     np.testing.assert_allclose(at_magic.largest_with_gravity, at_magic.gravity_theory, rtol=12 * contact)
 
 
+@pytest.mark.long
 def test_without_gravity_there_is_one_answer():
     scene = from_mapping({"ground": {"stiffness": 1e5}, "gravity": 0, "launch": {"velocity": [0, 0, -4]}})
     found = bounce_map.measure(scene, count=20, phases=30)

@@ -47,6 +47,7 @@ def of(found, method):
     return found.isel(method=meanings_of(found.method).index(method))
 
 
+@pytest.mark.long
 def test_numpy_and_we_fail_alike_and_scipy_does_not(limits):
     ours, theirs = of(limits, "symplectic_euler"), of(limits, "numpy")
     np.testing.assert_allclose(theirs.restitution, ours.restitution, rtol=1e-6)
@@ -124,6 +125,7 @@ def test_steps_and_evaluations_are_counted(speed):
     assert (of(speed, "scipy").taken != 600).all()
 
 
+@pytest.mark.long
 def test_files_say_of_which_versions_engines_were(limits, contact, speed, tmp_path):
     for k, found in enumerate((limits, contact, speed)):
         assert f"numpy {np.__version__}" in found.attrs["engine_versions"]

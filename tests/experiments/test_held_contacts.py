@@ -30,6 +30,7 @@ def test_the_error_falls_with_the_tolerance_as_far_as_lsoda_can_tell(dataset):
         ).all()
 
 
+@pytest.mark.long
 def test_a_held_corner_costs_more_and_less_than_by_lsoda(dataset):
     smooth, rough = dataset.evaluations.sel({"tolerance": 1e-9}).median(["launch", "stiffness"])
     assert rough > 3 * smooth

@@ -31,6 +31,7 @@ def test_every_mode_goes_unstable_at_the_limit_of_theory(measured):
     np.testing.assert_allclose(measured.limit, np.broadcast_to(theoretical, measured.limit.shape), rtol=1e-6)
 
 
+@pytest.mark.long
 def test_the_step_shows_the_modes_of_theory(measured):
     assert meanings_of(measured.inertia) == ["solid", "corners"]
     assert meanings_of(measured.mode) == ["face_bounce", "face_rocking", "edge", "corner"]

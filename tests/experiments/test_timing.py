@@ -32,6 +32,7 @@ def clock(monkeypatch):
     return clock
 
 
+@pytest.mark.long
 def test_runs_take_turns_and_a_long_one_is_called_once(clock):
     calls = []
     seconds = {"a": 2 * SHORTEST, "long": 0.03, "b": 4 * SHORTEST}

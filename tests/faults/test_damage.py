@@ -61,7 +61,7 @@ def test_what_was_damaged_is_named_and_made_again(undisturbed, tmp_path):
     is_as_undisturbed(project, undisturbed, *aside)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_what_is_made_of_shards_is_made_again_too(undisturbed, tmp_path):
     project = undisturbed.copy(tmp_path / "project")
     folder = project.results / "sweeps/steps"
@@ -89,7 +89,7 @@ def test_with_plain_snakemake_the_same_command_makes_it_again(undisturbed, tmp_p
     is_as_undisturbed(project, undisturbed, f"sweeps/steps/shards/{shard.name}")
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_a_shard_of_other_code_does_not_pass_for_ours_when_snakemake_forgot(undisturbed, tmp_path):
     project = undisturbed.copy(tmp_path / "project")
     (shard, *_) = shards_of(project)

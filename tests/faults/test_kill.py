@@ -1,7 +1,6 @@
 """kill -9 at any moment, of any part: the same command goes on, and ends with the bytes of an undisturbed run.
 
-STIFFDICE_KILLS says how many kills of the workflow there are: some of each kind of part unless told, hundreds in the
-long mode.
+STIFFDICE_KILLS says how many kills of the workflow there are in `make test-all`: some of each kind of part unless told.
 STIFFDICE_SEED repeats a sequence of kills; when they come still depends on the machine.
 """
 
@@ -23,7 +22,7 @@ import pytest
 from stiffdice.io import host
 from stiffdice.io.writer import write_bytes
 
-KILLS = int(os.environ.get("STIFFDICE_KILLS", "8"))
+FEW, KILLS = 1, int(os.environ.get("STIFFDICE_KILLS", "8"))
 SEED = int(os.environ.get("STIFFDICE_SEED", str(time.time_ns() % 10**6)))
 A_LIFE = 8  # kills before a life may go on to its end
 STARTING = 2.0  # seconds until Snakemake starts its first job, about
@@ -38,8 +37,8 @@ class Killer:
         self.kills = Counter()
         self._killed = Counter()  # by kind alone: the rarest is next
 
-    def live(self, project) -> None:
-        last = self.kills.total() + A_LIFE
+    def live(self, project, kills: int) -> None:
+        last = self.kills.total() + kills
         while self.kills.total() < last:
             if self._start_and_kill(project) == 0:  # it ended before the kill
                 break
@@ -120,14 +119,16 @@ def _end(process: psutil.Process) -> None:
 
 
 @pytest.mark.workflow
-@pytest.mark.long
-def test_whatever_is_killed_whenever_the_same_command_ends_with_the_same_data(undisturbed, tmp_path):
+@pytest.mark.parametrize(
+    "kills", [pytest.param(FEW, marks=pytest.mark.long), pytest.param(KILLS, marks=pytest.mark.broad)]
+)
+def test_whatever_is_killed_whenever_the_same_command_ends_with_the_same_data(undisturbed, tmp_path, kills):
     rng, whole = np.random.default_rng(SEED), undisturbed.data()
     killer, lives = Killer(rng, undisturbed.seconds, set(whole)), 0
-    while killer.kills.total() < KILLS:
+    while killer.kills.total() < kills:
         lives += 1
         project = undisturbed.copy(tmp_path / f"life-{lives}", results=False)
-        killer.live(project)
+        killer.live(project, min(kills, A_LIFE))
         found = project.data()
         told = f"seed {SEED}: {lives} lives, {dict(killer.kills)}"
         assert found.keys() == whole.keys(), told
@@ -204,7 +205,7 @@ print(json.dumps({"left": left, "there": sorted(entry.name for entry in Path().i
 """
 
 
-@pytest.mark.parametrize("what", ["bytes", "dataset", "spool", "shard"])
+@pytest.mark.parametrize("what", ["bytes", "dataset", "spool", pytest.param("shard", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(undisturbed, tmp_path, what):
     (tmp_path / "config").symlink_to(undisturbed.folder / "config")

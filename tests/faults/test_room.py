@@ -67,7 +67,8 @@ cp -a results/. whole
 @mounted
 @pytest.mark.workflow
 @pytest.mark.long
-@pytest.mark.parametrize("room", [64, 8])  # KiB: the disk is full when a job stores its result; or at once
+# KiB: the disk is full when a job stores its result; or at once.
+@pytest.mark.parametrize("room", [64, pytest.param(8, marks=pytest.mark.broad)])
 def test_a_full_disk_is_told_and_the_same_command_goes_on(undisturbed, tmp_path, room):
     project, shard = with_a_shard_missing(undisturbed, tmp_path / "project")
     done = shell(project, FILLING, ROOM=str(room), SHARD=str(shard))
@@ -154,7 +155,7 @@ def test_too_few_files_to_open_is_one_line(tmp_path):
 
 
 @pytest.mark.workflow
-@pytest.mark.long
+@pytest.mark.broad
 def test_as_many_files_to_open_as_it_asks_for_are_enough(undisturbed, tmp_path):
     project, _ = with_a_shard_missing(undisturbed, tmp_path / "project")
     command = ["sh", "-c", "ulimit -n 32; " + " ".join(project.command())]
@@ -192,6 +193,7 @@ for act in (lambda: write_dataset(whole, "out.h5"), spooled, lambda: open_file("
 """
 
 
+@pytest.mark.long
 def test_no_file_to_open_is_one_line_and_nothing_is_stored(tmp_path):
     command = [sys.executable, "-c", NO_MORE]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -30,10 +30,12 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize(
+    "share", [pytest.param(0.2, marks=pytest.mark.long), pytest.param(1, marks=pytest.mark.broad)], ids=["some", "all"]
+)
 @pytest.mark.parametrize("reader", READERS)
-@pytest.mark.long
-def test_a_spoilt_file_is_refused_in_one_line_or_sound(reader):
-    cases = int(os.environ.get("STIFFDICE_FUZZ", CASES[reader]))
+def test_a_spoilt_file_is_refused_in_one_line_or_sound(reader, share):
+    cases = round(share * int(os.environ.get("STIFFDICE_FUZZ", CASES[reader])))
     first = int(os.environ.get("STIFFDICE_FUZZ_FIRST", "0"))
     command = [sys.executable, "-m", "tests.fuzz.worker", reader, str(first), str(cases)]
     done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, errors="replace", check=False)

@@ -40,6 +40,7 @@ def test_a_word_selects_what_its_number_does(name, selection, number):
             np.testing.assert_array_equal(found[variable].values, numbers[variable].values)
 
 
+@pytest.mark.long
 def test_a_verdict_is_a_word_whatever_its_shape():
     run, shard = (stiffdice.open_results(FORMATS / "1.2" / f"{name}.h5") for name in ("run", "shard"))
     assert run.verdict.item() in ("passed", "energy_grew", "apex_rose")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from stiffdice.io.plain_dataset import PlainDataset, PlainVariable
@@ -50,6 +51,7 @@ def test_coordinates_are_named_to_those_who_read_with_other_tools(tmp_path):
         assert "coordinates" not in found["one"].encoding
 
 
+@pytest.mark.long
 def test_a_run_is_stored_and_inspected_without_xarray(tmp_path):
     """Importing it takes longer than they do."""
     told = (

@@ -96,6 +96,7 @@ def test_every_value_is_read_back_equal(written, read, kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+@pytest.mark.long
 def test_attributes_are_read_back_equal(written, engine, kind):
     ours = open_file(written[kind])
     with xr.open_dataset(written[kind], engine=engine, decode_times=False) as theirs:

@@ -36,6 +36,7 @@ def grid(sides, count=40):
         ({"at": "face", "mass": 0.4, "faces": [4]}, [0, -1.0, 0]),
     ],
 )
+@pytest.mark.long
 def test_a_loaded_box_is_a_box_and_a_point(load, place):
     sides = np.array([1.2, 2.0, 0.6])
     places = np.vstack([grid(sides), place])

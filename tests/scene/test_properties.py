@@ -65,6 +65,7 @@ mappings = st.builds(
 
 
 @given(mappings)
+@pytest.mark.long
 def test_a_scene_is_the_same_after_being_written_and_read(mapping):
     scene = from_mapping(mapping)
     text = yaml.safe_dump(scene.as_mapping())
@@ -98,6 +99,7 @@ def spelt(value, chance):
 
 
 @given(mappings, st.randoms(use_true_random=False))
+@pytest.mark.long
 def test_a_digest_is_of_the_scene_and_not_of_its_spelling(mapping, chance):
     scene = from_mapping(mapping)
     text = spelt(mapping, chance)

@@ -189,6 +189,7 @@ spins = vectors | st.builds(RandomSpin, st.integers(0, 2**32))
         st.sampled_from(sorted(PRESETS)),
     )
 )
+@pytest.mark.long
 def test_a_stored_scene_is_the_same_scene(scene):
     again = from_mapping(yaml.safe_load(yaml.safe_dump(scene.as_mapping())))
     assert again == scene

@@ -36,8 +36,8 @@ def extreme(kind, law):
 
 
 @pytest.mark.parametrize("kind", EXTREMES)
-@pytest.mark.parametrize("law", ["gated", "ungated"])
-@pytest.mark.parametrize(("steps", "share"), [(1, 1.0), (10_000, 0.1)])
+@pytest.mark.parametrize("law", ["gated", pytest.param("ungated", marks=pytest.mark.broad)])
+@pytest.mark.parametrize(("steps", "share"), [(1, 0.1), (10_000, 0.1), pytest.param(1, 1.0, marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_event_ends_with_a_verdict_whatever_the_scene(kind, law, steps, share):
     """A few seconds of work, however the intervals are; of such a share of the budget."""
@@ -92,6 +92,7 @@ def test_an_engine_of_its_own_steps_has_a_budget_too():
     assert np.isfinite(run.trajectory.state["position"]).all()
 
 
+@pytest.mark.long
 def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.yaml").write_text("ground: {damping: 1.0e15, contact: gated}\n")
@@ -109,7 +110,7 @@ def test_run_has_a_budget_and_stores_what_it_bought(capsys, tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("kind", EXTREMES)
-@pytest.mark.parametrize("law", ["gated", "ungated"])
+@pytest.mark.parametrize("law", ["gated", pytest.param("ungated", marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_advise_ends_soon_whatever_the_scene(kind, law):
     """With advice, for a part of the time at least, or by saying that it finds no path: by its patience, in seconds."""
@@ -134,7 +135,13 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("kind", LONG)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        kind if kind in ("event within an interval", "advise") else pytest.param(kind, marks=pytest.mark.broad)
+        for kind in LONG
+    ],
+)
 @pytest.mark.long
 def test_ctrl_c_ends_a_run_at_once(kind, tmp_path):
     ground = "stiffness: 1.0e+10, contact: gated"

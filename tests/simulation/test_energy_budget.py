@@ -141,6 +141,7 @@ def test_the_first_step_of_a_throw_is_booked_with_its_spin(node_velocity):
 
 @pytest.mark.parametrize("preset", ["as_listed", "as_written"])
 @pytest.mark.parametrize("model", LANDING)
+@pytest.mark.long
 def test_a_million_steps_close_to_the_last_digits(preset, model):
     kept = ledger(paper(preset), model=model, steps=1_000_000)
     assert change(kept) == pytest.approx(kept.end_energy - kept.launch_energy, abs=2e-14)  # of 54 J
@@ -221,6 +222,7 @@ def test_at_fine_steps_damping_and_friction_only_take(scheme, model, contact):
         assert kept.friction_work < -1
 
 
+@pytest.mark.long
 def test_coarse_steps_let_friction_overshoot_and_give():
     """A kick of friction more than twice the sliding speed is the scheme's artefact; it is booked as friction acts."""
     slow = {"velocity": [0.01, 0, 5]}

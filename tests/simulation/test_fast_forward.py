@@ -38,6 +38,7 @@ def test_many_steps_at_once_are_as_many_steps(square, rate, steps):
     assert end == pytest.approx(float(now), rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.long
 def test_roots_too_close_to_tell_apart_are_left_to_stepping():
     h = 1e-3
     assert np.isnan(symplectic_euler.swing(0.1, 0.0, h, 100, 1.0 / h**2 / 100, 2 * 0.1 / h - 0.01 / h, 0.0)[0])

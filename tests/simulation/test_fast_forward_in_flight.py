@@ -163,6 +163,7 @@ extremes = st.floats(-320, 308).map(lambda exponent: 10.0**exponent) | st.just(0
     extremes,
     st.integers(1, 300),
 )
+@pytest.mark.long
 def test_no_scene_is_too_extreme_to_be_skipped(
     model, contact, gravity, stiffness, damping, duration, way, speed, steps
 ):

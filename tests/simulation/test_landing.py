@@ -61,7 +61,7 @@ def test_the_face_that_energy_decides_is_the_one_at_rest(body, ground):
     assert (early.steps[decided] < full.steps[decided]).all()
 
 
-@pytest.mark.long
+@pytest.mark.broad
 @pytest.mark.parametrize("ground", ["hard", "ungated"])
 def test_no_face_differs_from_full_rest_in_a_hundred_thousand_throws(ground):
     scene = scene_of("cube", ground)
@@ -73,9 +73,10 @@ def test_no_face_differs_from_full_rest_in_a_hundred_thousand_throws(ground):
     assert not (early.face != full.face)[decided].any()
 
 
-@pytest.mark.long
-def test_a_fair_cube_from_uniform_orientations_comes_out_fair():
-    count = 200_000
+@pytest.mark.parametrize(
+    "count", [pytest.param(20_000, marks=pytest.mark.long), pytest.param(200_000, marks=pytest.mark.broad)]
+)
+def test_a_fair_cube_from_uniform_orientations_comes_out_fair(count):
     scene = scene_of()
     result = land(scene, THROWN.draw(scene, count), steps=16_000, threads=2)
     seen = np.bincount(result.face, minlength=7)[1:]
@@ -94,13 +95,20 @@ def test_no_throw_depends_on_its_neighbours_or_on_threads():
         assert part.ends.tobytes() == whole.ends[chosen].tobytes()
 
 
-@pytest.mark.long
-def test_every_scheme_throws_the_same_die():
+@pytest.mark.parametrize(
+    "schemes",
+    [
+        pytest.param(["velocity_verlet"], marks=pytest.mark.long),
+        pytest.param(["symplectic_euler", "rk4", "implicit_euler"], marks=pytest.mark.broad),
+    ],
+    ids=["one", "others"],
+)
+def test_every_scheme_throws_the_same_die(schemes):
     """Dropped so low that chaos has no time: at short steps throws end on the same face, whatever the scheme."""
     scene = scene_of(duration=0.8, position=[0, 0, 0.03], velocity=[0.2, 0, 0])
     launches = LaunchDistribution(velocity_spread=0.1, spin_spread=10.0).draw(scene, 100)
     best = land(scene, launches, scheme="event", steps=2000)
-    for scheme in ("symplectic_euler", "velocity_verlet", "rk4", "implicit_euler"):
+    for scheme in schemes:
         found = land(scene, launches, scheme=scheme, steps=100_000)
         assert (found.face == best.face).mean() > 0.9, scheme
 

@@ -98,6 +98,7 @@ def test_clearance_is_exact_near_the_ground_and_never_too_much(model, normal, st
     assert (seen["clearance"] < lowest - 0.01).any()
 
 
+@pytest.mark.long
 def test_flights_are_counted_in_steps_and_bounces_in_flights():
     seen, lowest = watched(from_mapping({"ground": GATED}), 2000)
     air = (lowest > 0).tolist()

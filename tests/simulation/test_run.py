@@ -219,6 +219,7 @@ extremes = st.floats(-300, 300).map(lambda exponent: 10.0**exponent) | st.just(0
     st.tuples(*[st.floats(-1e6, 1e6)] * 3),
     st.integers(1, 50),
 )
+@pytest.mark.long
 def test_every_scene_ends_with_a_verdict(model, contact, stiffness, damping, friction, mass, spin, steps):
     scene = from_mapping(
         {

@@ -116,6 +116,7 @@ def names(sweep):
     return set(shards.of(sweep))
 
 
+@pytest.mark.long
 def test_a_shards_name_tells_what_it_computes(sweep_of):
     before = names(sweep_of())
     assert before == names(sweep_of()) == names(sweep_of(simulator="stiffdice")) < names(sweep_of(refine=2))

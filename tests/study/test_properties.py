@@ -185,6 +185,7 @@ FINE = {"early_stop": (True,), "steps": (), "stiffness": ()}
 
 @read_each
 @given(asked=sweeps, key=st.sampled_from([*base, *more]), junk=st.sampled_from(JUNK))
+@pytest.mark.long
 def test_a_value_that_cannot_be_is_refused_with_the_file_and_its_key(load, asked, key, junk):
     if junk in FINE.get(key, ()):
         return
@@ -203,6 +204,7 @@ def test_a_value_that_cannot_be_is_refused_with_the_file_and_its_key(load, asked
         st.sampled_from(JUNK) | sweeps | st.floats() | st.integers() | st.lists(st.text(max_size=4), max_size=2),
     )
 )
+@pytest.mark.long
 def test_whatever_is_asked_it_is_a_sweep_or_refused_in_one_line(load, asked):
     try:
         assert isinstance(load(asked)[1], Sweep)

@@ -350,6 +350,7 @@ def project(made, tmp_path, monkeypatch, capsys):
     return call
 
 
+@pytest.mark.long
 def test_the_exit_status_says_how_it_stands(project):
     shard = project.made.named("shard")
     assert project("quick")[0] == project()[0] == 0
@@ -415,6 +416,7 @@ def test_watching_ends_when_all_is_done(project):
     assert [json.loads(line)["state"] for line in lines] == ["done"]
 
 
+@pytest.mark.long
 def test_watching_ends_when_the_run_has_ended(project, monkeypatch):
     """Not between two of its jobs."""
     made, run = project.made, project.made.named("trajectory")

@@ -31,6 +31,7 @@ def first_round(sweep):
 
 
 @given(sweeps)
+@pytest.mark.long
 def test_every_cell_is_in_one_shard_and_in_order(asked):
     sweep = planned(asked)
     dealt = [cell for shard in first_round(sweep).values() for cell in cells_of(shard.pieces)]
@@ -132,6 +133,7 @@ def test_a_round_without_cells_has_empty_shards(plan):
     assert partition.share(plan, [], 3) == [(), (), ()]
 
 
+@pytest.mark.long
 def test_rounds_go_where_members_disagree(small, tmp_path):
     sweep = dataclasses.replace(small, refine=2, omega_h={"from": 2.5, "to": 0.3, "count": 10})
     found = rounds.judged(sweep, rounds.compute(sweep, tmp_path))

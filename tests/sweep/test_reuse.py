@@ -30,12 +30,12 @@ def folder(before, tmp_path):
 
 @pytest.fixture
 def extended(small):
-    """The sweep with a harder ground and more steps, a cell of it all the work of a job."""
+    """The sweep with a harder ground and more steps, in jobs of a few cells."""
     return dataclasses.replace(
         small,
         stiffness={"from": 1e2, "to": 10**3.5, "count": 4},
         omega_h=[small.omega_h, {"from": 0.5, "to": 0.4, "count": 3}],
-        seconds_per_job=1e-3,
+        seconds_per_job=4e-3,
     )
 
 
@@ -71,6 +71,7 @@ def test_an_extended_grid_computes_what_is_new_and_nothing_else(extended, small,
         assert path.read_bytes() == (folder / path.name).read_bytes()
 
 
+@pytest.mark.long
 def test_cells_of_later_rounds_are_kept_too(small, tmp_path, monkeypatch):
     refined = dataclasses.replace(small, omega_h={"from": 2.5, "to": 0.3, "count": 8}, refine=1)
     paths = rounds.compute(refined, tmp_path)

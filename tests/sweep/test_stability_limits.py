@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import rounds
 from tests.conftest import each
 
 from stiffdice.io.cf_enums import meanings_of
@@ -158,6 +160,7 @@ def test_both_laws_fail_above_the_linear_limit_and_pass_far_below_it(found):
     assert (found.steps_needed < 12 * found.limit).all()
 
 
+@pytest.mark.long
 def test_numbers_stay_finite_where_the_energy_does_not(shards):
     """Blowing up is not leaving the range of doubles: below the linear limit no run ends but by the criteria asked."""
     edges = stability_limits.find(collect(each(shards), {"finite": 0.0, "energy": 0.05}))
@@ -189,6 +192,7 @@ def test_edges_are_those_of_each_column(found, collected, plan):
         assert found.first_pass[k, c, s] == steps[failing == 0].min()
 
 
+@pytest.mark.long
 def test_a_tolerance_from_the_study_is_used_and_stored(lax):
     edges = stability_limits.find(lax)
     assert edges.tolerance.values.tolist() == [1e6, 0.02]
@@ -231,3 +235,19 @@ def test_the_table_has_a_line_for_each_point(found):
     assert (law, criterion, float(tolerance), float(stiffness)) == ("ungated", "energy", 0.05, 100.0)
     assert float(limit) == 100.0
     assert float(first) == found.first_pass.values[UNGATED, ENERGY, 0]
+
+
+@pytest.mark.long
+def test_another_simulator_finds_the_same_edges(small, tmp_path):
+    """In a first bounce: in later ones round-off grows until it decides which member passes."""
+    scene, stiffness = dataclasses.replace(small.scene, duration=2.5), {"from": 1e3, "to": 1e3, "count": 1}
+    few = dataclasses.replace(small, scene=scene, contact=("ungated",), stiffness=stiffness)
+    found = {}
+    for simulator in (few.simulator, "numpy"):
+        (tmp_path / simulator).mkdir()
+        paths = rounds.compute(dataclasses.replace(few, simulator=simulator), tmp_path / simulator)
+        found[simulator] = stability_limits.find(collect(each(paths), few.criteria))
+    ours, theirs = found.values()
+    assert np.isfinite(ours.first_pass.values).all()
+    for name in ("first_pass", "last_fail", "flips"):
+        np.testing.assert_array_equal(theirs[name], ours[name])

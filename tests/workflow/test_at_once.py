@@ -16,6 +16,7 @@ from pathlib import Path
 import psutil
 import pytest
 import yaml
+from tests.forks import run_module
 from tests.workflow.test_workflow import ROOT, Project
 
 BOOKS = {"measure": "energy-budget", "scene": "config/scenes/figure-09.yaml", "options": {"steps": [10000, 20000]}}
@@ -94,10 +95,11 @@ def test_a_study_that_is_being_made_is_not_made_twice_and_nothing_stays_locked(p
     assert (status, out) == (2, "")
     assert re.fullmatch(rf"{line}\n", err)
     # Snakemake by itself says it among its own words, and looks on as before.
-    status, _, err = call(project, [sys.executable, "-m", "snakemake", "results/many/experiments/second.h5"])
-    assert status == 2
-    assert re.search(rf"^{line}$", err, re.MULTILINE)
-    assert call(project, [*run("many")[:1], "-m", "snakemake", "-n", "study", "--config", "study=many"])[0] == 0
+    itself = {"cwd": project.folder, "environment": project.environment}
+    done = run_module("snakemake", "results/many/experiments/second.h5", **itself)
+    assert done.returncode == 2
+    assert re.search(rf"^{line}$", done.stderr, re.MULTILINE)
+    assert run_module("snakemake", "-n", "study", "--config", "study=many", **itself).returncode == 0
     status, _, err = call(project, [sys.executable, "workflow/clean.py"])
     assert status == 2
     assert re.fullmatch(rf"{line}; nothing was removed\n", err)

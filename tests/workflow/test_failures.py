@@ -122,6 +122,7 @@ def test_status_says_so_too(failed):
     }
 
 
+@pytest.mark.broad
 def test_once_mended_the_same_command_completes(failed):
     """The last test here: it mends what the others look at."""
     project, _ = failed

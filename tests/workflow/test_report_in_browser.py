@@ -73,7 +73,7 @@ def test_a_script_in_a_page_would_be_seen(tmp_path):
     assert seen.title == "broken" and seen.elements == 1
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_nothing_of_a_title_runs_in_the_report(tmp_path):
     project = Project(tmp_path)
     run = {**TINY["runs"]["stiff"], "presets": ["as_listed"], "steps": 1000}

@@ -95,7 +95,9 @@ def replaced_by_tar(old, new):
     ("replaced", "scene", "due"),
     [
         (replaced_by_mv, "figure-09", {"trajectory": 2, "experiment": 1, "figure": 2}),
-        (replaced_by_cp, "figure-01", {"trajectory": 1, "timing": 1, "animation": 1}),
+        pytest.param(
+            replaced_by_cp, "figure-01", {"trajectory": 1, "timing": 1, "animation": 1}, marks=pytest.mark.broad
+        ),
         (replaced_by_tar, "figure-13", SWEPT),
     ],
 )
@@ -114,15 +116,15 @@ def test_an_older_scene_is_run(copied, tmp_path, replaced, scene, due):
     ("before", "after", "due"),
     [
         ("steps: 10000", "steps: 20000", {"trajectory": 2, "figure": 1}),
-        ("every: 2000", "every: 1000", {"trajectory": 1, "animation": 1}),
-        ("- 20000", "- 30000", {"experiment": 1, "figure": 1}),
-        ("rounds: 1", "rounds: 2", {"timing": 1}),
-        ("members: 4", "members: 5", SWEPT),
+        pytest.param("every: 2000", "every: 1000", {"trajectory": 1, "animation": 1}, marks=pytest.mark.broad),
+        pytest.param("- 20000", "- 30000", {"experiment": 1, "figure": 1}, marks=pytest.mark.broad),
+        pytest.param("rounds: 1", "rounds: 2", {"timing": 1}, marks=pytest.mark.broad),
+        pytest.param("members: 4", "members: 5", SWEPT, marks=pytest.mark.broad),
         ("early_stop: false", "early_stop: false\n    criteria: {energy: 0.2}", SWEPT | {"shard": 1}),
         ("title: Position", "title: Place", {"figure": 1}),
-        ("title: Movie", "title: Film", {"animation": 1}),
-        ("title: Answers", "title: Replies", {"table": 1}),
-        ("question:", "dpi: 60\nquestion:", {"figure": 3, "animation": 1}),
+        pytest.param("title: Movie", "title: Film", {"animation": 1}, marks=pytest.mark.broad),
+        pytest.param("title: Answers", "title: Replies", {"table": 1}, marks=pytest.mark.broad),
+        pytest.param("question:", "dpi: 60\nquestion:", {"figure": 3, "animation": 1}, marks=pytest.mark.broad),
     ],
 )
 @pytest.mark.long
@@ -236,7 +238,7 @@ def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp
         assert len(failing) == len(names)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_a_figure_that_was_touched_up_is_set_aside_and_made_again(copied):
     figure = copied.folder / "results/tiny/figures/position.png"
     before = figure.read_bytes()

@@ -65,6 +65,7 @@ def at_work(log: Path) -> bool:
 LONG = "import time; say('here'); time.sleep(60)"
 
 
+@pytest.mark.long
 def test_a_job_is_a_child_of_the_warm_process(warm, tmp_path):
     script, log = begun(tmp_path, "one", "import os; say(str(os.getppid()))")
     assert script.wait() == 0
@@ -80,6 +81,7 @@ def test_jobs_at_once_have_their_own_words_and_share_nothing(warm, tmp_path):
     assert [path.read_text() for path in tmp_path.glob("*.out")] == ["3.141592653589793\n"] * 4
 
 
+@pytest.mark.long
 def test_a_job_ends_with_the_script_that_waits_for_it(warm, tmp_path):
     script, log = begun(tmp_path, "one", LONG)
     until(lambda: at_work(log))
@@ -101,6 +103,7 @@ def test_jobs_end_with_the_warm_process_and_later_ones_do_without(warm, tmp_path
     assert log.read_text().splitlines()[2] == str(os.getpid())
 
 
+@pytest.mark.long
 def test_a_script_that_is_killed_while_it_hands_over_leaves_the_warm_process_at_work(warm, tmp_path):
     for part in (b"", (9).to_bytes(8), (9).to_bytes(8) + b"1"):
         with socket.socket(socket.AF_UNIX) as script:
@@ -110,6 +113,7 @@ def test_a_script_that_is_killed_while_it_hands_over_leaves_the_warm_process_at_
     assert begun(tmp_path, "next", "say('made')")[0].wait(timeout=60) == 0
 
 
+@pytest.mark.long
 def test_a_job_of_slurm_is_not_handed_over(warm, tmp_path, monkeypatch):
     """It has a node, memory and time of its own."""
     monkeypatch.setenv("SLURM_JOB_ID", "1")

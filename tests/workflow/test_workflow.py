@@ -139,8 +139,8 @@ class Project:
 def finished(tmp_path_factory):
     """A project whose study has run; tests that change it take their changes back."""
     project = Project(tmp_path_factory.mktemp("finished"), own_source=True)
-    done = project.make("--cores", "2")
-    assert done.returncode == 0, done.stderr
+    project.made = project.make("--cores", "2")
+    assert project.made.returncode == 0, project.made.stderr
     return project
 
 
@@ -264,9 +264,9 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
 @pytest.mark.parametrize(
     ("script", "due"),
     [
-        ("figure", {"figure": 4}),
-        ("table", {"table": 1}),
-        ("measure", {"experiment": 2, "timing": 1, "figure": 2}),
+        pytest.param("figure", {"figure": 4}, marks=pytest.mark.broad),
+        pytest.param("table", {"table": 1}, marks=pytest.mark.broad),
+        pytest.param("measure", {"experiment": 2, "timing": 1, "figure": 2}, marks=pytest.mark.broad),
         ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
@@ -333,7 +333,9 @@ def test_a_bad_study_is_one_line_status_2_and_nothing_written(finished, edited):
     ]
 
 
-@pytest.mark.parametrize("name", ["../x", "a b", "v1.5", "nowhere", ""])
+@pytest.mark.parametrize(
+    "name", ["../x", "nowhere", *(pytest.param(name, marks=pytest.mark.broad) for name in ("a b", "v1.5", ""))]
+)
 @pytest.mark.long
 def test_a_study_that_is_not_there_is_one_line(finished, name):
     done = run_module("snakemake", "-n", "study", "--config", f"study={name}", cwd=finished.folder)
@@ -364,7 +366,7 @@ def test_lint_finds_nothing(finished):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     """In the same study; what needs one that is not installed is left out with a line."""
     project, steps = Project(tmp_path), TINY["sweeps"]["steps"]
@@ -388,7 +390,7 @@ def test_another_simulator_finds_the_same_edges(tmp_path, monkeypatch):
     assert project.jobs_due() == {}
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_neither_shard_size_nor_order_nor_a_kill_changes_a_number(finished, tmp_path):
     """kill -9 to Snakemake and all its jobs, at the moment the first shard is there."""
     other = Project(tmp_path)
@@ -414,12 +416,10 @@ def test_neither_shard_size_nor_order_nor_a_kill_changes_a_number(finished, tmp_
     assert other.results(*DATA) == finished.results(*DATA)
 
 
-@pytest.mark.long
 def test_where_the_time_went_is_told(finished):
-    done = finished.make("--cores", "2", "--forcerun", "collect")
-    assert done.returncode == 0, done.stderr
+    done = finished.made
     assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
     assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
-    # Before it, how long it will take, of the four jobs that are due; and at last what to open.
-    assert len(re.findall(r"^stiffdice: tiny: 4 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
+    # Before it, how long it will take, of all jobs; and at last what to open.
+    assert len(re.findall(r"^stiffdice: tiny: 14 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
     assert done.stdout.splitlines()[-1] == f"open first: results/tiny/figures/books.svg ({TITLE})"

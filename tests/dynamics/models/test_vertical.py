@@ -54,6 +54,7 @@ def test_ground_that_is_not_level_is_refused(normal):
         simulate(scene, model="vertical", steps=10)
 
 
+@pytest.mark.long
 def test_the_sets_of_models_say_what_the_models_say():
     @njit
     def asked(model):

@@ -20,6 +20,7 @@ def long_box():
     return landing.measure(scene, throws=3000)
 
 
+@pytest.mark.long
 def test_faces_that_symmetry_makes_equal_are(long_box):
     """The ends 1 and 6 against each other, the four sides, too; the ends are rarer."""
     p, n = long_box.probability.values, float(long_box["count"].sum())

@@ -71,12 +71,14 @@ def test_many_throws_are_counted(capsys):
     assert "of all cases" in out
 
 
+@pytest.mark.long
 def test_a_load_shows(capsys):
     _, out, _ = told(capsys, "--count", "2000", "--json", "--set", "cube.load={at: corner, mass: 1 g}")
     shares = [face["share"] for face in json.loads(out)["faces"].values()]
     assert 1.5 * max(shares[:3]) < min(shares[3:])  # the load is at 1, 2, 3
 
 
+@pytest.mark.long
 def test_an_animation_is_as_long_as_slow_motion_makes_it(capsys, tmp_path):
     status, out, _ = told(capsys, "--animate", str(tmp_path / "throw.gif"))
     assert status == 0

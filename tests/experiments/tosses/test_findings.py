@@ -25,7 +25,7 @@ def launched(tosses, source="sample"):
     return launches_of(tosses, source, toss_files.SCENE.gravity)
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_studys_board_is_the_one_that_is_fitted(halves):
     mine, _ = halves
     found = fit.fit(mine, launched(mine), toss_files.SCENE, Physics(), rounds=3)

@@ -69,6 +69,7 @@ def test_touches_down_when_the_lowest_node_first_reaches_the_ground(model):
         assert clearance(scene, model, time + 1e-6)[0] < 0
 
 
+@pytest.mark.long
 def test_finds_a_corner_that_dips_in_for_a_moment_only():
     """A spinning cube passes so low that a corner is below the ground for about a millisecond."""
     reach = math.sqrt(3) * from_mapping({"cube": {"geometry": "exact"}}).cube.side / 2

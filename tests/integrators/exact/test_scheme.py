@@ -351,6 +351,7 @@ def test_the_papers_scheme_converges_to_it(contact):
     assert error(100_000) < 1e-3
 
 
+@pytest.mark.long
 def test_the_oscillator_on_all_sides_of_the_critical_damping():
     with mpmath.workdps(40):
         for omega, ratio, t in itertools.product(

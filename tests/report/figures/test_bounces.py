@@ -17,9 +17,12 @@ def bounces():
     return {"bounces": bounce_map.measure(scene, omega_h=(0.1, 1.9), count=30, phases=40)}
 
 
-@pytest.mark.long
-def test_axes_have_units_and_equal_data_give_equal_files(bounces, tmp_path):
+def test_axes_have_units(bounces):
     check_units(drawn("bounce-map", bounces))
+
+
+@pytest.mark.broad
+def test_equal_data_give_equal_files(bounces, tmp_path):
     check_equal_files("bounce-map", bounces, tmp_path)
 
 

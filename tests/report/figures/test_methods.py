@@ -42,7 +42,7 @@ def lines_of(panel):
 
 
 @pytest.mark.parametrize("name", ["work-energy", "cost"])
-@pytest.mark.long
+@pytest.mark.broad
 def test_equal_data_give_equal_files(data, tmp_path, name):
     check_equal_files(name, {"flat": data["flat"]}, tmp_path)
 
@@ -73,6 +73,7 @@ def test_errors_are_drawn_against_work_one_line_for_each_method(data):
             assert lines[method].get_linestyle() == ("--" if method in PEERS else "-")
 
 
+@pytest.mark.long
 def test_the_floor_is_drawn_and_within_the_axes(data):
     flat = data["flat"]
     for stiffness, panel in enumerate(drawn("work-precision", data).axes[:3]):
@@ -167,6 +168,7 @@ def test_axes_of_engines_have_units(limits, speed, throw):
             assert not labels or "[" in labels
 
 
+@pytest.mark.long
 def test_notes_tell_versions_and_what_is_missing(limits, speed):
     for name, data in {"engine-limits": limits, "engine-speed": speed}.items():
         told = texts(drawn(name, {"name": data}))

@@ -25,10 +25,13 @@ def drawn(given):
     return drawing.drawn("refinement-check", given)
 
 
-@pytest.mark.long
-def test_axes_have_units_and_equal_data_give_equal_files(given, drawn, tmp_path):
+def test_axes_have_units(drawn):
     drawing.check_units(drawn)
     assert all("[" in axes.get_xlabel() for axes in drawn.axes)
+
+
+@pytest.mark.broad
+def test_equal_data_give_equal_files(given, tmp_path):
     drawing.check_equal_files("refinement-check", given, tmp_path)
 
 

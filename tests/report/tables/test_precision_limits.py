@@ -36,6 +36,7 @@ def test_every_limit_is_found_where_its_formula_says(keys, measured):
         assert found[name] == pytest.approx(value, rel=rough.get(name, 1e-6)), name
 
 
+@pytest.mark.long
 def test_the_papers_limits_are_predicted_by_formula_and_found_by_bisection(measured):
     predicted, found = by_name(measured, "predicted"), by_name(measured, "measured")
     side = Scene().cube.side
