@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair-engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ landing: install  ## how often each face of a die is up, and how coarse steps ma
 
 engines: install  ## the engines that are installed beside stiffdice, into results/engines/
 	@$(RUN) engines
+
+pair-engines: install  ## two boxes in MuJoCo and Drake beside stiffdice, into results/pair-engines/
+	@$(RUN) study --config study=pair-engines
 
 tosses: install  ## real tosses of a cube, and the simulation beside them, into results/tosses/
 	@$(RUN) tosses

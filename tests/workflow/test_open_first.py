@@ -37,6 +37,7 @@ def made(project, *names):
         ("tradeoff", "evaluations-position.svg (Error of the position against force evaluations)"),
         ("refinement", "refinement.svg (A cube that slides: the dense grid's answer"),
         ("shapes", "ends.svg (How often a square box (a, a, c) lands on one of its ends"),
+        ("pair-engines", "peers.svg (Two boxes in contact: what users of other engines complained of"),
         ("engines", "limits.svg (One flat bounce with longer and longer steps"),
     ],
 )

@@ -25,12 +25,14 @@ Variable = tuple[str | Sequence[str], Any, dict[str, Any]]
 _KNOWN = dataset.CELL_ATTRIBUTES | {"axis": dataset.AXIS_ATTRIBUTES}
 # Meaning and unit of the others, where the name does not say it; one whose values are words is an enum.
 _COORDINATES = {
+    "angle": ("turn of a box", "rad"),
     "aspect": ("length of a square box over its width, c/a", "1"),
     "approximation": ("model without rotation: with friction, and without", "1"),
     "bounce": ("number of the bounce", "1"),
     "bound": ("bound of the floor", "1"),
     "check": ("what was changed of how the coefficients are measured", "1"),
     "damping": ("ground damping", "kg s-1"),
+    "depth": ("depth of a cube in another, over its side", "1"),
     "duration": ("duration of the runs", "s"),
     "face": ("pips of the face", "1"),
     "force": ("force by overlap", "1"),
@@ -48,6 +50,7 @@ _COORDINATES = {
     "path_omega_h": ("omega h of the fastest contact, of paths", "1"),
     "phase": ("fraction of the step before the nodes meet the ground", "1"),
     "piece": ("piece of the full model that the scene does not need", "1"),
+    "pose": ("how two boxes are put", "1"),
     "quantile": ("quantile over the throws", "1"),
     "rest": ("how a throw ended", "1"),
     "restitution": ("speed up over speed down of a flat landing", "1"),
@@ -59,6 +62,8 @@ _COORDINATES = {
     "step_size": ("step size", "s"),
     "time": ("time since the launch", "s"),
     "tolerance": ("tolerance of the scheme event", "1"),
+    "turn": ("how a box is turned", "1"),
+    "twist": ("turn of the upper box about the vertical", "rad"),
     "value": ("value of the number that is changed", "1"),
     "young": ("Young's modulus", "Pa"),
     "zeta": ("damping ratio of the mode itself, (D/S) omega/2", "1"),

@@ -73,6 +73,7 @@ DRAWINGS: dict[str, Entry] = {
     "box-faces": Entry("stiffdice.report.figures.dice", "ends", "experiments", "box-faces"),
     "face-response": Entry("stiffdice.report.figures.dice", "response", "experiments", "face-response"),
     "launch-response": Entry("stiffdice.report.figures.dice", "launches", "experiments", "launch-response"),
+    "pair-peers": Entry("stiffdice.report.figures.pair.peers", "draw", "experiments", "pair-peers"),
     "model-ablation-time": Entry("stiffdice.report.figures.model_ablation", "draw_times", "timings", "model-ablation"),
 }
 
@@ -93,6 +94,7 @@ TABLES: dict[str, Entry] = {
     "toss-chaos": Entry(_TOSSES_TOLD, "chaos", "experiments", "toss-chaos"),
     "face-response": Entry("stiffdice.report.tables.dice", "response", "experiments", "face-response"),
     "response-checks": Entry("stiffdice.report.tables.dice", "checks", "experiments", "response-checks"),
+    "pair-peers": Entry("stiffdice.report.tables.pair_peers", "table", "experiments", "pair-peers"),
     "targets": Entry(_TOLD, "targets", "experiments", "work-precision", timed=True),
 }
 
@@ -125,6 +127,7 @@ EXPERIMENTS: dict[str, Entry] = {
     "engine-contact": Entry("stiffdice.experiments.engines", "contact"),
     "engine-limits": Entry("stiffdice.experiments.engines", "limits"),
     "engine-throw": Entry("stiffdice.experiments.engines", "throw"),
+    "pair-peers": Entry("stiffdice.experiments.pair.peers", "measure"),
 }
 
 # (scene, **options) -> a dataset of times; they differ from one rebuild to the next, and nothing else runs meanwhile.

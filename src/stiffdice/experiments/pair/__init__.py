@@ -1,0 +1,1 @@
+"""Questions of two cubes that meet."""

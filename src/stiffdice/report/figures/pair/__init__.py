@@ -1,0 +1,1 @@
+"""Figures of two cubes that meet."""
