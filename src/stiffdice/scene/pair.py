@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from stiffdice.errors import InputError
+from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
 from stiffdice.scene.cube import Cube
@@ -93,12 +95,21 @@ def from_mapping(mapping: object) -> PairScene:
     Raises InputError naming the key, the value and what is allowed.
     """
     top = validation.known_keys("", mapping, _TOP_KEYS)
-    cubes = top.get("cubes")
-    if not isinstance(cubes, list) or len(cubes) != 2:
-        raise InputError(f"cubes = {validation.shown(cubes)}: allowed is a list of two, each with cube and launch")
+    cubes = _two(top.get("cubes"))
     shared = {key: top[key] for key in ("gravity", "duration") if key in top}
     a, b = (_part(f"cubes.{k}", part, shared, top.get("ground")) for k, part in enumerate(cubes))
+    if a.ground != b.ground:
+        raise InputError(
+            "ground.restitution: asks for another damping under each of two cubes that differ in mass; allowed is "
+            "ground.damping"
+        )
     return PairScene((a, b))
+
+
+def _two(cubes: object) -> list[Any]:
+    if not isinstance(cubes, list) or len(cubes) != 2:
+        raise InputError(f"cubes = {validation.shown(cubes)}: allowed is a list of two, each with cube and launch")
+    return cubes
 
 
 def _part(where: str, mapping: object, shared: Mapping[str, Any], ground: object) -> Scene:
@@ -109,10 +120,54 @@ def _part(where: str, mapping: object, shared: Mapping[str, Any], ground: object
     try:
         return scenes.from_mapping({**shared, **whole})
     except InputError as error:
-        raise error if str(error).startswith(("ground", "gravity", "duration")) else error.within(where) from None
+        shared_key = str(error).startswith(("ground", "gravity", "duration"))
+        raise error if shared_key else InputError(f"{where}.{error}") from None
 
 
 def _with_defaults(name: str, section: object) -> object:
     if section is None:
         return _DEFAULTS[name]
     return {**_DEFAULTS[name], **section} if isinstance(section, Mapping) else section
+
+
+def is_pair(mapping: object) -> bool:
+    """Return whether plain data are of a scene of two boxes, by their key."""
+    return isinstance(mapping, Mapping) and "cubes" in mapping
+
+
+def load(path: str | Path, overrides: Sequence[str] = ()) -> PairScene:
+    """Return the scene of two boxes in a YAML file.
+
+    path: of the file; config/README.md lists its keys, with units. overrides: single keys to change, each as
+    "ground.stiffness=1e6" or "cubes.0.launch.velocity=[1, 0, 0]"; the cubes are 0 and 1.
+
+    Raises InputError naming the file, the key, the value and what is allowed.
+    """
+    data = yaml_loader.load(path)
+    try:
+        return changed(data, overrides)
+    except InputError as error:
+        raise error.within(str(path)) from None
+
+
+def changed(mapping: object, overrides: Sequence[str] = ()) -> PairScene:
+    """Return the scene that plain data describe, with `key.path=value` overrides; raises InputError."""
+    for override in overrides:
+        mapping = _overridden(mapping, override)
+    return from_mapping(mapping)
+
+
+def _overridden(mapping: object, text: str) -> dict[str, Any]:
+    """Return plain data with one `key.path=value` set."""
+    top = dict(validation.known_keys("", mapping, _TOP_KEYS))
+    keys, value, told = *scenes.change_of(text), f"--set {text}"
+    if keys[0] != "cubes":
+        shared = {key: part for key, part in top.items() if key != "cubes"}
+        return {**top, **scenes.set_in(shared, keys, value, told=told)}
+    if len(keys) == 1:
+        return {**top, "cubes": value}
+    if len(keys) == 2 or keys[1] not in ("0", "1"):
+        raise InputError(f"{told}: allowed are cubes.0 and cubes.1, as in cubes.1.launch.velocity=[1, 0, 0]")
+    cubes, number = list(_two(top.get("cubes"))), int(keys[1])
+    cubes[number] = scenes.set_in(cubes[number], keys[2:], value, told=told, where=f"cubes.{number}.")
+    return {**top, "cubes": cubes}

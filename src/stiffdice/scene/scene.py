@@ -244,29 +244,37 @@ def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = N
 def changed(mapping: object, overrides: Sequence[str] = (), preset: str | None = None) -> Scene:
     """Return the scene that plain data describe, with `key.path=value` overrides; raises InputError."""
     for override in overrides:
-        mapping = _override(mapping, override)
+        mapping = set_in(mapping, *change_of(override), told=f"--set {override}")
     return from_mapping(mapping, preset)
 
 
-def _override(data: Any, text: str) -> Any:
-    """Return plain data with one `key.path=value` set; the value is read as YAML."""
+def change_of(text: str) -> tuple[list[str], Any]:
+    """Return the keys and the value of a change `key.path=value`; the value is read as YAML."""
     path, equals, raw = text.partition("=")
-    section, *rest = keys = path.strip().split(".")
+    keys = path.strip().split(".")
     if not equals or not all(keys):
         raise InputError(f"--set {text}: allowed is key.path=value, such as ground.stiffness=1e6")
     try:
-        value = raw if _ONE_UNIT.fullmatch(raw) else yaml_loader.parse(raw)
+        return keys, raw if _ONE_UNIT.fullmatch(raw) else yaml_loader.parse(raw)
     except InputError as error:
         raise error.within(f"--set {text}") from None
+
+
+def set_in(data: Any, keys: list[str], value: Any, *, told: str, where: str = "") -> dict[str, Any]:
+    """Return plain data of a scene with the value of one key set.
+
+    told: how the change was asked for. where: of what the data are a part, `cubes.0.` of the first of two cubes.
+    """
+    section, *rest = keys
     result = dict(validation.known_keys("", _given(data), _TOP_KEYS))
     if not rest:
         if section in _SECTIONS:
-            validation.known_keys(section, value, _KEYS[section])
+            validation.known_keys(f"{where}{section}", value, _KEYS[section])
         return result | {section: value}
     if section not in _SECTIONS or len(keys) > 3 or (len(keys) == 3 and keys[:2] != ["launch", "angular_momentum"]):
-        known = [f"{name}.{key}" for name, inner in _KEYS.items() for key in inner]
-        raise InputError(f"--set {text}: no such key{validation.meant(path, known)}")
-    given = validation.known_keys(section, _given(result.get(section)), _KEYS[section])
+        known = [f"{where}{name}.{key}" for name, inner in _KEYS.items() for key in inner]
+        raise InputError(f"{told}: no such key{validation.meant(where + '.'.join(keys), known)}")
+    given = validation.known_keys(f"{where}{section}", _given(result.get(section)), _KEYS[section])
     if len(keys) == 3:
         spin = given.get(rest[0])
         value = {**(spin if isinstance(spin, dict) else {}), rest[1]: value}
