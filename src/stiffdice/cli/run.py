@@ -5,9 +5,14 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stiffdice.cli import common
-from stiffdice.errors import printable
+from stiffdice.errors import InputError, printable
+
+if TYPE_CHECKING:
+    from stiffdice.io.plain_dataset import PlainDataset
 
 HELP = "run one scene and store its trajectory and verdict in one HDF5 file"
 EXAMPLES = """\
@@ -16,6 +21,7 @@ examples:
   stiffdice run config/scenes/figure-09.yaml --model sliding --preset as_written -o stiff.h5
   stiffdice run config/scenes/figure-04.yaml --set launch.angular_momentum='{seed: 7}' --every 100 -o turning.h5
   stiffdice run config/scenes/figure-09.yaml --set ground.restitution=0.5 --dt '0.1 ms' -o half.h5
+  stiffdice run config/scenes/two-cubes.yaml --set cubes.0.launch.velocity='[3, 0, 1]' --animate two.gif -o two.h5
   stiffdice run config/scenes/figure-09.yaml --simulator numpy --preset as_written --steps 2000 -o theirs.h5
 
 The file is netCDF-4 on HDF5: xarray.open_dataset("throw.h5") opens it. Exit status: 0 when the run is done, whatever
@@ -23,12 +29,18 @@ its verdict; 2 for bad input.
 """
 
 
+_DPI = 120  # of an animation
+
+
 def add(run: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
-    told = "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)"
-    run.add_argument("--model", default="tumbling", metavar="M", help=told)
+    told = (
+        "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling); "
+        "pair: two cubes, of a scene with `cubes` (default there)"
+    )
+    run.add_argument("--model", metavar="M", help=told)
     told = "stiffdice, or mujoco, pybullet, drake, scipy, octave, numpy where installed (default: stiffdice)"
     run.add_argument("--simulator", default="stiffdice", metavar="NAME", help=told)
     told = "symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
@@ -44,49 +56,61 @@ def add(run: argparse.ArgumentParser) -> None:
         "a run that needs more is stored as undecided"
     )
     run.add_argument("--budget", metavar="N", help=told)
-    told = "book where the energy goes, bounce by bounce (takes longer)"
+    told = "book where the energy goes, bounce by bounce, of two cubes body by body (takes longer)"
     run.add_argument("--ledger", action="store_true", help=told)
+    run.add_argument("--animate", metavar="FILE.gif", help="draw the run as it goes, of what turns")
     run.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
     common.add_changes(run)
 
 
 def call(options: argparse.Namespace) -> None:
     """Run the scene, store the run, and print its verdict."""
-    from stiffdice.io import seal
+    from stiffdice.io import yaml_loader
+    from stiffdice.scene import pair
+
+    if options.animate is not None and not options.animate.endswith(".gif"):
+        raise InputError(f"--animate = {options.animate}: allowed is a name that ends with .gif")
+    if pair.is_pair(yaml_loader.load(options.scene)):
+        _run_pair(options)
+    else:
+        _run_one(options)
+
+
+def _run_one(options: argparse.Namespace) -> None:
+    """Run a scene of one cube."""
     from stiffdice.scene import scene as scenes
     from stiffdice.scene import validation
 
     scene = scenes.load(options.scene, options.overrides, options.preset)
-    steps, note = common.whole("--steps", options.steps), ""
-    if options.dt is not None:
-        steps, note = common.steps_of(options.dt, scene.duration)
-    target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
+    steps, note = _steps_of(options, scene.duration)
+    target, drawing = _targets_of(options)
 
     # These take about a second to import; bad input is told before.
     from stiffdice.cli.terminal.progress import progress
     from stiffdice.dynamics.model_selection import AUTO
+    from stiffdice.dynamics.state import TURNING
     from stiffdice.integrators import registry as schemes
     from stiffdice.io.writer import write_dataset
     from stiffdice.report import run_page
     from stiffdice.simulation import backend, energy_budget
     from stiffdice.simulation.dataset import plain_run_dataset
-    from stiffdice.simulation.run import default_every, simulate
+    from stiffdice.simulation.run import simulate
 
-    setup = backend.setup_of(scene, options.model, options.simulator, options.scheme, steps)
+    model = options.model or "tumbling"
+    setup = backend.setup_of(scene, model, options.simulator, options.scheme, steps)
     if options.ledger:
         validation.choice("--ledger: simulator", setup.simulator, [backend.OURS])
         validation.choice("--ledger: scheme", setup.scheme, energy_budget.BOOKED)
-    every = default_every(steps)
-    if options.every is not None:
-        every = validation.count("every", common.whole("--every", options.every), at_most=steps)
+    if drawing is not None:
+        validation.choice("--animate: model", setup.model, sorted(TURNING))
+    every = _every_of(options, steps)
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
-    for line in run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps):
-        print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
+    _warn(run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps))
     with progress(setup.scheme if setup.ours else "") as show:
         run = simulate(
             scene,
-            model=options.model,
+            model=model,
             simulator=options.simulator,
             scheme=options.scheme,
             steps=steps,
@@ -101,9 +125,99 @@ def call(options: argparse.Namespace) -> None:
         ledger = energy_budget.ledger(scene, model=run.model, scheme=run.scheme, steps=steps, budget=done)
         dataset = dataset.assign(ledger.data_vars)
     write_dataset(dataset, target)
-    for line in filter(None, [*scene.derived, note]):
-        print(printable(line))
-    if options.model == AUTO:
+    if drawing is not None:
+        _animate(dataset, drawing, "A thrown cube")
+    _say([*scene.derived, note])
+    if model == AUTO:
         print(run.model_reason)
     advise = shlex.join(["stiffdice", "advise", *common.scene_words(options, options.overrides), "--error", "1%"])
-    print("\n".join(map(printable, run_page.lines(run, str(target), advise))))
+    _say(run_page.lines(run, str(target), advise))
+
+
+# Options that mean nothing for two cubes, with what does.
+_OF_ONE = {
+    "preset": "none for two cubes, whose contact is gated; --set cubes.0.cube.geometry=printed sets one key of it",
+    "tolerance": "none for two cubes, whose schemes take steps as given; --steps makes them shorter",
+    "budget": "none for two cubes, whose schemes take steps as given; --steps says how many",
+}
+
+
+def _run_pair(options: argparse.Namespace) -> None:
+    """Run a scene of two cubes."""
+    from stiffdice.scene import pair
+
+    for name, allowed in _OF_ONE.items():
+        if (given := getattr(options, name)) is not None:
+            raise InputError(f"--{name} = {given}: allowed is {allowed}")
+    if options.model not in (None, "pair"):
+        raise InputError(f"--model = {options.model}: allowed is pair for two cubes, or nothing")
+    if options.simulator != "stiffdice":
+        told = "allowed is stiffdice for two cubes; `make engines` compares engines, by one cube"
+        raise InputError(f"--simulator = {options.simulator}: {told}")
+    scene = pair.load(options.scene, options.overrides)
+    steps, note = _steps_of(options, scene.duration)
+    target, drawing = _targets_of(options)
+
+    from stiffdice.cli.terminal.progress import progress
+    from stiffdice.io.writer import write_dataset
+    from stiffdice.report import pair_page
+    from stiffdice.simulation import backend
+    from stiffdice.simulation.pair.dataset import plain_pair_dataset
+    from stiffdice.simulation.pair.run import check_scheme, simulate_pair
+
+    scheme = options.scheme or backend.DEFAULT_SCHEME
+    check_scheme(scheme)
+    every = _every_of(options, steps)
+    with progress(scheme) as show:
+        _warn(pair_page.doubts(scene, scheme, steps))
+        run = simulate_pair(scene, scheme=scheme, steps=steps, every=every, progress=show)
+    dataset = plain_pair_dataset(run)
+    write_dataset(dataset, target)
+    if drawing is not None:
+        _animate(dataset, drawing, "Two cubes")
+    _say([*scene.derived, note, *pair_page.lines(run, str(target))])
+
+
+def _steps_of(options: argparse.Namespace, duration: float) -> tuple[int, str]:
+    """Return the number of steps, and what to say of it."""
+    if options.dt is not None:
+        return common.steps_of(options.dt, duration)
+    return common.whole("--steps", options.steps), ""
+
+
+def _every_of(options: argparse.Namespace, steps: int) -> int:
+    """Return after how many steps each a state is kept."""
+    from stiffdice.scene import validation
+    from stiffdice.simulation.run import default_every
+
+    if options.every is None:
+        return default_every(steps)
+    return validation.count("every", common.whole("--every", options.every), at_most=steps)
+
+
+def _targets_of(options: argparse.Namespace) -> tuple[Path, Path | None]:
+    """Return the files to write: the run, and its animation, if one is asked for."""
+    from stiffdice.io import seal
+    from stiffdice.io.writer import check_target
+
+    target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
+    return target, None if options.animate is None else check_target(options.animate)
+
+
+def _animate(dataset: PlainDataset, target: Path, title: str) -> None:
+    """Draw a run as it goes."""
+    import xarray as xr
+
+    from stiffdice.report.figures import registry, runs
+
+    registry.store(runs.animation, {"run": xr.Dataset(*dataset)}, title, _DPI, [str(target)])
+
+
+def _warn(lines: list[str]) -> None:
+    for line in lines:
+        print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
+
+
+def _say(lines: list[str]) -> None:
+    for line in filter(None, lines):
+        print(printable(line))

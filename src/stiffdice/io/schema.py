@@ -59,7 +59,7 @@ ATTRIBUTES = {
     "Conventions": Attribute("`CF-1.11`"),
     "title": Attribute("of what, in words"),
     "format_version": Attribute(f"of this page: `{FORMAT_VERSION}`"),
-    "kind": Attribute("`run`, `shard`, `sweep`, `frontier`, `experiment`, `timing` or `bench`"),
+    "kind": Attribute("`run`, `pair`, `shard`, `sweep`, `frontier`, `experiment`, `timing` or `bench`"),
     "stiffdice_version": Attribute("of the package that wrote it"),
     "libraries": Attribute("versions of NumPy, numba, LLVM, h5py, h5netcdf, xarray: `name version; name version`"),
     "code_digest": Attribute("SHA-256 of the source that the numbers depend on: modules named, all they import"),
@@ -69,7 +69,7 @@ ATTRIBUTES = {
         "the request, as JSON: model, scheme, steps, members, seed, grid, …; of experiments the options"
     ),
     "config_digest": Attribute("SHA-256 of that text"),
-    "model": Attribute("`vertical`, `sliding`, `tumbling`, `flying`; in experiments also `case` or `all`"),
+    "model": Attribute("`vertical`, `sliding`, `tumbling`, `flying`, `pair`; in experiments also `case` or `all`"),
     "scheme": Attribute("the time-stepping scheme; of an outside engine, its own"),
     "formula": Attribute("contact law and one step of the scheme, as formulas"),
     "history": Attribute("by which version it was made; no time", RECOMMENDED),
@@ -106,6 +106,7 @@ _MACHINE = {
 }
 
 _TIME, _PLACE, _RUN, _CELL = ("time",), ("time", "axis"), ("cell", "member"), ("cell",)
+_PLACES = "time", "cube", "axis"
 _EDGES, _FIT = ("contact", "criterion", "stiffness"), ("contact", "criterion", "edge")
 _SCAN = ("criterion", "cell")
 
@@ -164,6 +165,32 @@ _RUN_VARIABLES = {
     ),
 }
 
+_PAIR_VARIABLES = {
+    "step": _RUN_VARIABLES["step"],
+    "position": _RUN_VARIABLES["position"]._replace(dimensions=_PLACES),
+    "velocity": _RUN_VARIABLES["velocity"]._replace(dimensions=_PLACES),
+    "angular_momentum": Variable(_PLACES, "angular momentum about the centre", "kg m2 s-1"),
+    "node_offset": Variable(("time", "cube", "node", "axis"), "node relative to the centre", "m"),
+    "kinetic_energy": Variable(_TIME, "kinetic energy of both, of translation and rotation", "J"),
+    "potential_energy": Variable(_TIME, "potential energy m g z of both centres of mass", "J"),
+    "elastic_energy": _RUN_VARIABLES["elastic_energy"],
+    "contact_energy": Variable(_TIME, "energy in the springs between the cubes", "J"),
+    "mechanical_energy": Variable(_TIME, "all four energies, the velocity taken at the time of the place", "J"),
+    "energy_ratio": Variable(
+        (),
+        "largest energy in the air over that of the launch",
+        note="counted from both cubes at rest on the ground",
+    ),
+    "deepest_contact": Variable((), "deepest contact between the cubes", "m"),
+    "meetings": Variable((), "how often the cubes have begun to touch", type="i8"),
+    "verdict": _RUN_VARIABLES["verdict"]._replace(note=""),
+    "steps_done": _RUN_VARIABLES["steps_done"],
+    "time": _RUN_VARIABLES["time"],
+    "cube": Variable(("cube",), "cube, numbered as in the scene", type="i1", role=COORDINATE, note="0, 1"),
+    "axis": _RUN_VARIABLES["axis"],
+    "node": _RUN_VARIABLES["node"]._replace(need=REQUIRED),
+}
+
 _FRONTIER_VARIABLES = {
     "first_pass": Variable(_EDGES, "fewest steps at which every member passes", note="NaN if none"),
     "last_fail": Variable(_EDGES, "most steps at which a member still fails", note="NaN if none"),
@@ -189,23 +216,38 @@ _FRONTIER_VARIABLES = {
     **{f"cell_{name}": part for name, part in _CELLS.items()},
 }
 
+_STEPS = {
+    "steps": Attribute("number of time steps of the run", type=WHOLE),
+    "step_size": Attribute("duration/steps, in the unit of `step_size_units` (s)", type=NUMBER),
+}
+_DERIVED = Attribute(
+    "values of the scene that were given in other words (a side for a radius, a restitution for a damping),"
+    " and from what; the values themselves are in `scene`",
+    OPTIONAL,
+)
+
 KINDS: dict[str, Kind] = {
     "run": Kind(
         {
             **_SIMULATOR,
-            "steps": Attribute("number of time steps of the run", type=WHOLE),
-            "step_size": Attribute("duration/steps, in the unit of `step_size_units` (s)", type=NUMBER),
+            **_STEPS,
             "omega_h": Attribute("contact frequency of a flat landing times step size", type=NUMBER),
             "criteria": Attribute(_CRITERIA),
             "tolerance": Attribute("of the error, for a scheme that controls its own", RECOMMENDED, NUMBER),
             "hop_height": _HOP_HEIGHT,
-            "scene_derived": Attribute(
-                "values of the scene that were given in other words (a side for a radius, a restitution for a damping),"
-                " and from what; the values themselves are in `scene`",
-                OPTIONAL,
-            ),
+            "scene_derived": _DERIVED,
         },
         _RUN_VARIABLES,
+    ),
+    "pair": Kind(
+        {
+            **{name: part for name, part in _SIMULATOR.items() if name != "model_reason"},
+            **_STEPS,
+            "omega_h": Attribute("fastest contact of the two stacked on the ground times step size", type=NUMBER),
+            "criteria": Attribute(_CRITERIA),
+            "scene_derived": _DERIVED,
+        },
+        _PAIR_VARIABLES,
     ),
     "shard": Kind(
         _OF_RUNS,

@@ -29,6 +29,9 @@ _BOOKED = ("launch_energy", "damping_work", "drag_work", "friction_work", "schem
 _OF_BOUNCES = tuple(f"bounce_{part}" for part in ("start", "damping_work", "drag_work", "friction_work", "scheme_work"))
 SHOWN = 10
 
+# How the names end of what a verdict rests on.
+_MEASURES = ("_ratio", "_error", "_phase", "deepest_contact", "meetings")
+
 
 def as_text(dataset: PlainDataset | xr.Dataset, name: str) -> str:
     """Return a page on a dataset: what it is, its verdict, its scene, its variables with units."""
@@ -66,8 +69,9 @@ def _verdicts(dataset: PlainDataset | xr.Dataset) -> list[str]:
     (name,) = counts
     measures = []
     for measure, variable in dataset.data_vars.items():
-        if not variable.dims and str(measure).endswith(("_ratio", "_error", "_phase")):
-            found = f" = {variable.values:.6g}: {variable.attrs['long_name']}"
+        if not variable.dims and str(measure).endswith(_MEASURES):
+            unit = "" if variable.attrs["units"] == "1" else f" {variable.attrs['units']}"
+            found = f" = {variable.values:.6g}{unit}: {variable.attrs['long_name']}"
             none = measure == "apex_ratio" and not variable.values
             measures.append(f"  {measure}{': no rebound to compare with the one before' if none else found}")
     # A later version may have verdicts of other names.

@@ -48,11 +48,15 @@ def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
         )
     fewest = max(linear_stability.fewest_steps(scene, model, scheme)) if scheme in schemes.SCHEMES else 0.0
     if steps < fewest:
-        needed = f"{scheme} needs {_rounded_up(fewest)} or more"
-        none = f"{scheme} has none on this ground; symplectic_euler or event has"
-        limit = none if math.isinf(fewest) else needed
-        said.append(f"{steps:,} steps are beyond the limit of linear stability: {limit}")
+        said.append(beyond_limit(scheme, steps, fewest, "symplectic_euler or event has"))
     return said
+
+
+def beyond_limit(scheme: str, steps: int, fewest: float, better: str) -> str:
+    """Return the doubt about too few steps; better: what has a limit where the scheme has none, `fewest` infinite."""
+    needed = f"{scheme} needs {_rounded_up(fewest)} or more"
+    limit = f"{scheme} has none on this ground; {better}" if math.isinf(fewest) else needed
+    return f"{steps:,} steps are beyond the limit of linear stability: {limit}"
 
 
 def _rounded_up(steps: float) -> str:

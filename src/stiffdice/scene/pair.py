@@ -71,7 +71,12 @@ class PairScene:
     @property
     def derived(self) -> tuple[str, ...]:
         """Which values follow from others that were given, a line for each."""
-        return tuple(dict.fromkeys(line for part in self.parts for line in part.derived))
+        told = (
+            f"cubes.{number}.{line}" if line.startswith("cube.") else line
+            for number, part in enumerate(self.parts)
+            for line in part.derived
+        )
+        return tuple(dict.fromkeys(told))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the scene as plain data, every key resolved; `from_mapping` gives the same scene back."""

@@ -21,6 +21,7 @@ from stiffdice.io.plain_dataset import PlainDataset
 from stiffdice.io.structure_check import FORMAT_VERSION
 from stiffdice.scene.cube import SIGNS
 from stiffdice.scene.flat_landing import CONTACT_LAWS
+from stiffdice.scene.pair import PairScene
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation import backend
 from stiffdice.simulation.criteria.registry import CRITERIA, criteria_of
@@ -58,7 +59,7 @@ def criteria_text(tolerances: Mapping[str, float]) -> str:
     )
 
 
-def provenance_attributes(title: str, scene: Scene, model: str, scheme: str, *code: str) -> dict[str, Any]:
+def provenance_attributes(title: str, scene: Scene | PairScene, model: str, scheme: str, *code: str) -> dict[str, Any]:
     """Return the global attributes that say what made a file; nothing that two rebuilds would not share.
 
     code: the modules whose numbers the file holds.

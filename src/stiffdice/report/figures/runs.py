@@ -31,6 +31,8 @@ _PIPS: dict[int, tuple[tuple[int, int], ...]] = {
     5: ((0, 0), *_CORNERS),
     6: (*_CORNERS, (-1, 0), (1, 0)),
 }
+# Of one cube, and of the other.
+_COLOURS = (style.BLUE, style.ORANGE)
 # Seconds that an animation of a short run lasts.
 _SHORTEST_ANIMATION = 6.0
 
@@ -70,16 +72,17 @@ die_animation = partial(animation, pips=True)
 
 
 def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Callable[[int], list[Any]]]:
-    """Return a figure with the ground in 3-D axes, equal in scale, and a function that shows the cube at a sample."""
+    """Return a figure with the ground in 3-D axes, equal in scale, and a function that shows the cubes at a sample."""
     figure = style.new_figure(title, height=3.2)
     figure.set_layout_engine("none")
     style.add_note(figure, describe(run, law=True))
     axes: Any = figure.add_axes((-0.26, -0.22, 1.44, 1.44), projection="3d", computed_zorder=False)
     # A box, on whole units, that holds the cube for the whole run; the unit is a metre for the cube of the paper.
-    reach = float(np.linalg.norm(run.node_offset.values[0], axis=-1).max())
+    places, nodes = _motion(run)
+    reach = float(np.linalg.norm(nodes[0] - places[0, :, None], axis=-1).max())
     unit = 10.0 ** math.floor(math.log10(reach / 0.5))
-    low = np.floor((run.position.values.min(axis=0) - reach) / unit) * unit
-    high = np.ceil((run.position.values.max(axis=0) + reach) / unit) * unit
+    low = np.floor((places.min(axis=(0, 1)) - reach) / unit) * unit
+    high = np.ceil((places.max(axis=(0, 1)) + reach) / unit) * unit
     middle = (low[1] + high[1]) / 2
     low[1], high[1] = min(low[1], middle - 3 * unit), max(high[1], middle + 3 * unit)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
@@ -106,8 +109,23 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
     axes.set_yticks(np.arange(np.ceil(low[1] / wide) * wide, high[1] + unit / 2, wide))
     axes.set_zticks([0, 2 * unit, 4 * unit] if high[2] < 8 * unit else np.arange(0, high[2] + unit / 2, 5 * unit))
     axes.tick_params(labelsize=7.5, pad=-1)
-    places, nodes = run.position.values, run.position.values[:, None] + run.node_offset.values
-    look = {"colors": style.BLUE, "linewidths": 1.3, "zorder": 4, "clip_on": False}
+    shown = [_body(axes, places[:, k], nodes[:, k], _COLOURS[k], pips) for k in range(places.shape[1])]
+    return figure, lambda sample: [artist for show in shown for artist in show(sample)]
+
+
+def _motion(run: xr.Dataset) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return places, shape (time, cube, 3), and nodes, shape (time, cube, 8, 3), of one cube or of two [m]."""
+    places, offsets = run.position.values, run.node_offset.values
+    if "cube" not in run.dims:
+        places, offsets = places[:, None], offsets[:, None]
+    return places, places[:, :, None] + offsets
+
+
+def _body(
+    axes: Any, places: npt.NDArray[np.float64], nodes: npt.NDArray[np.float64], colour: str, pips: bool
+) -> Callable[[int], list[Any]]:
+    """Return a function that shows a cube at a sample, its pips if asked, and the way that it has come."""
+    look = {"colors": colour, "linewidths": 1.3, "zorder": 4, "clip_on": False}
     edges = axes.add_collection3d(Line3DCollection(np.zeros((1, 2, 3)), **look))
     (dots,) = axes.plot(*places[:1].T, color=style.INK, marker="o", markersize=1.4, linestyle="none", zorder=5)
     dots.set_visible(pips)
@@ -121,7 +139,7 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
         dots.set_data_3d(*_pips_on(seen, nodes[sample]).T)
         return [edges, trace, *([dots] if pips else [])]
 
-    return figure, show
+    return show
 
 
 def _faces_in_sight(nodes: npt.NDArray[np.float64]) -> list[int]:

@@ -1,0 +1,78 @@
+"""What is said of a run of two boxes: doubts before it, and afterwards how it went."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stiffdice.dynamics import linear_theory
+from stiffdice.dynamics.box_contact.pair_state import pair_physics_of, pair_start_of
+from stiffdice.dynamics.state import Array
+from stiffdice.integrators import linear_stability
+from stiffdice.report import run_page
+from stiffdice.scene.pair import PairScene
+from stiffdice.simulation.outcome import Verdict
+from stiffdice.simulation.pair import energy, linear_limit
+from stiffdice.simulation.pair.run import TOLERANCE, PairRun, PairTrajectory
+
+# Of the energy in the springs between the boxes at the launch: so many times that of one that rests on the other.
+_PRESSED = 4.0
+
+
+def doubts(scene: PairScene, scheme: str, steps: int) -> list[str]:
+    """Return what speaks against a run before it is made, a line each."""
+    said = []
+    for number, part in enumerate(scene.parts):
+        for line in run_page.doubts(part, "tumbling", "", steps):
+            said.append(f"cubes.{number}{'.' if line.startswith('launch.') else ': '}{line}")
+    stored = float(energy.energies(pair_physics_of(scene), pair_start_of(scene), 0.0)[3, 0])
+    rest = max(0.5 * part.cube.mass * scene.gravity * linear_theory.sag(part) for part in scene.parts)
+    if stored > _PRESSED * rest:
+        said.append(f"the cubes start in each other; the springs between them hold {stored:.3g} J and throw them apart")
+    if steps < (fewest := linear_limit.fewest_steps(scene, scheme)):
+        said.append(run_page.beyond_limit(scheme, steps, fewest, "symplectic_euler has"))
+    return said
+
+
+def lines(run: PairRun, name: str) -> list[str]:
+    """Return how a run of one launch with its trajectory went; name: of its file."""
+    meetings, deepest = int(run.meetings[0]), float(run.deepest[0])
+    times = f"{meetings} time{'' if meetings == 1 else 's'}"
+    ratio = f"{run.energy_ratio[0]:.6g}, allowed {1 + TOLERANCE:g}"
+    said = [
+        f"{name}: {Verdict(run.verdict[0]).sentence}",
+        f"  energy    {ratio}: largest energy in the air over that of the launch",
+        f"  contact   they met {times}{f', {deepest:.3g} m deep at most' if meetings else ''}",
+    ]
+    if run.trajectory is not None:
+        said += _motion(run.trajectory)
+    return [*said, f"  steps     {_steps(run)}"]
+
+
+def _motion(trajectory: PairTrajectory) -> list[str]:
+    """Return how the boxes move when they have parted for the first time, as far as kept states tell, or at the end."""
+    touching = trajectory.contact_energy > 0
+    parted = np.flatnonzero(touching[:-1] & ~touching[1:]) + 1
+    k, told = (parted[0], "parted") if len(parted) else (-1, "ended")
+    moving = [
+        f"cube {number}: {_vector(state['velocity'])} m/s, spin {_vector(state['angular_velocity'])} rad/s"
+        for number, state in enumerate((trajectory.state["a"][k], trajectory.state["b"][k]))
+    ]
+    whole = trajectory.mechanical_energy
+    return [
+        f"  {told}    at t = {trajectory.time[k]:.4g} s, {moving[0]}",
+        f"            {'':{len(f'at t = {trajectory.time[k]:.4g} s,')}} {moving[1]}",
+        f"  budget    {whole[0]:.6g} J at the launch, {whole[-1]:.6g} J at the end, springs included",
+    ]
+
+
+def _vector(v: Array) -> str:
+    return "[" + ", ".join(f"{part:.3g}" for part in v) + "]"
+
+
+def _steps(run: PairRun) -> str:
+    mode = linear_limit.hardest(run.scene)
+    if mode.omega == 0:
+        return "nothing springs back, so that no contact limits the step"
+    limit = linear_stability.stability_limit(run.scheme, mode.zeta)
+    omega_h = mode.omega * run.scene.duration / run.steps
+    return f"ωh = {omega_h:.3g}, linear limit {limit:.3g} ({run.scheme}; {mode.mode})"
