@@ -67,8 +67,8 @@ def run(written):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda run: run.drop_attrs(deep=False), "attribute kind = None: allowed is run or shard"),
-        (lambda run: run.assign_attrs(kind="walk"), "attribute kind = walk: allowed is run or shard"),
+        (lambda run: run.drop_attrs(deep=False), "attribute kind = None: allowed is run or pair or shard"),
+        (lambda run: run.assign_attrs(kind="walk"), "attribute kind = walk: allowed is run or pair or shard"),
         (lambda run: run.drop_vars("velocity"), "variable velocity is missing"),
         (lambda run: run.transpose(), "position has dimensions axis time: allowed is time axis"),
         (lambda run: run.assign(step=run.step.astype("i4")), "step has type i4: allowed is i8"),

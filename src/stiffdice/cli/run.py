@@ -144,7 +144,7 @@ _OF_ONE = {
 
 def _run_pair(options: argparse.Namespace) -> None:
     """Run a scene of two cubes."""
-    from stiffdice.scene import pair
+    from stiffdice.scene import pair, validation
 
     for name, allowed in _OF_ONE.items():
         if (given := getattr(options, name)) is not None:
@@ -162,16 +162,22 @@ def _run_pair(options: argparse.Namespace) -> None:
     from stiffdice.io.writer import write_dataset
     from stiffdice.report import pair_page
     from stiffdice.simulation import backend
+    from stiffdice.simulation.pair import energy_budget
     from stiffdice.simulation.pair.dataset import plain_pair_dataset
     from stiffdice.simulation.pair.run import check_scheme, simulate_pair
 
     scheme = options.scheme or backend.DEFAULT_SCHEME
     check_scheme(scheme)
+    if options.ledger:
+        validation.choice("--ledger: scheme", scheme, [energy_budget.BOOKED])
     every = _every_of(options, steps)
-    with progress(scheme) as show:
+    with progress("two cubes") as show:
         _warn(pair_page.doubts(scene, scheme, steps))
         run = simulate_pair(scene, scheme=scheme, steps=steps, every=every, progress=show)
-    dataset = plain_pair_dataset(run)
+        dataset = plain_pair_dataset(run)
+        if options.ledger:
+            booked = energy_budget.ledger(scene, steps=steps, every=every, done=int(run.steps_done[0]))
+            dataset = dataset.assign(booked.data_vars)
     write_dataset(dataset, target)
     if drawing is not None:
         _animate(dataset, drawing, "Two cubes")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,6 +46,8 @@ def as_text(dataset: PlainDataset | xr.Dataset, name: str) -> str:
     dimensions = dict.fromkeys((*_BOOKED, "bounce_count"), ()) | dict.fromkeys(_OF_BOUNCES, ("bounce",))
     if all(name in variables and variables[name].dims == dims for name, dims in dimensions.items()):
         lines += ["", "energy ledger of the run", *_ledger(dataset)]
+    if booked := {name: part for name, part in variables.items() if str(name).startswith("body_")}:
+        lines += ["", "energy of each cube since the launch [J]", *_ledger_of_bodies(booked)]
     rows = []
     for key, variable in variables.items():
         shape = zip(variable.values.shape, variable.dims, strict=True)
@@ -87,6 +90,16 @@ def _ledger(dataset: PlainDataset | xr.Dataset) -> list[str]:
     units = [f"{name.removeprefix('bounce_')} [{'s' if name == 'bounce_start' else 'J'}]" for name in _OF_BOUNCES]
     values = zip(*(variables[name].values[:SHOWN] for name in _OF_BOUNCES), strict=True)
     return [*lines, *aligned([units, *([f"{value:.6g}" for value in row] for row in values)])]
+
+
+def _ledger_of_bodies(booked: Mapping[Any, Any]) -> list[str]:
+    """Return what was booked of each body until the end, a line for each force."""
+    rows = [["", "cube 0", "cube 1"]]
+    for name, variable in booked.items():
+        if variable.dims == ("time", "cube") and variable.values.shape[1] == 2:
+            first, last = variable.values[0], variable.values[-1]
+            rows.append([str(name).removeprefix("body_"), *(f"{value:+.6g}" for value in last - first)])
+    return list(aligned(rows))
 
 
 def _verdict_counts(dataset: PlainDataset | xr.Dataset) -> dict[str, int]:

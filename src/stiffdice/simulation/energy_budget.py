@@ -72,7 +72,7 @@ AMOUNTS = {
 # Words of `bounce_ended`.
 ENDED = ("in_contact", "in_air")
 
-_DAMPING, _DRAG, _FRICTION, _SPRING = range(4)  # forces of the ground, in the order of AMOUNTS
+DAMPING, _DRAG, FRICTION, SPRING = range(4)  # forces of the ground, in the order of AMOUNTS
 
 # A state as the ledger sees it. forces: force [N] and torque [N m] of each of the ground's; motion: velocity [m/s] and
 # L/I [rad/s]; energies [J], kinetic that of the stored velocity, less `lag` that of the velocity at the stored place;
@@ -193,12 +193,15 @@ def _look(physics: Physics, states: States, late: float, views: npt.NDArray[np.v
         view.elastic = energy.elastic(physics, state)
         view.lag = physics.mass * fall * (state.velocity[2] - 0.5 * fall)
         view.energy = view.kinetic + view.potential + view.elastic - view.lag
-        view.clearance = _feel(physics, state, view.forces)
+        view.clearance = feel(physics, state, view.forces)
 
 
 @njit
-def _feel(physics: Physics, state: Any, forces: Any) -> float:
-    """Add up each force of the ground over the nodes, as the models do, and return the clearance [m]."""
+def feel(physics: Physics, state: Any, forces: Any) -> float:
+    """Add up each force of the ground over the nodes, as the models do, and return the clearance [m].
+
+    physics: without the nodes' weight. forces [N, N m]: shape (4, 6), of DAMPING, drag, FRICTION and SPRING.
+    """
     clearance = height_of(physics, state) - physics.reach
     if not reaches(physics, clearance):
         return float(clearance)
@@ -211,9 +214,9 @@ def _feel(physics: Physics, state: Any, forces: Any) -> float:
         if depth > 0.0:
             spring, speed = physics.stiffness * depth, upward(physics, velocity)
             push = normal_force(physics, depth, speed)
-            _pull(forces[_SPRING], arm, times(spring, n))
-            _pull(forces[_DAMPING], arm, times(push - spring, n))
-            _pull(forces[_FRICTION], arm, plus_times(force, -push, n))
+            _pull(forces[SPRING], arm, times(spring, n))
+            _pull(forces[DAMPING], arm, times(push - spring, n))
+            _pull(forces[FRICTION], arm, plus_times(force, -push, n))
         else:
             _pull(forces[_DRAG], arm, force)
         clearance = min(clearance, -depth)

@@ -86,8 +86,12 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
     middle = (low[1] + high[1]) / 2
     low[1], high[1] = min(low[1], middle - 3 * unit), max(high[1], middle + 3 * unit)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
-    long = high[0] - low[0] > 4 * (high[1] - low[1])
-    axes.set_box_aspect((high[0] - low[0], high[1] - low[1], high[2]), zoom=1.25 if long else 1.0)
+    sizes = high[0] - low[0], high[1] - low[1], high[2]
+    if "cube" in run.dims:
+        axes.set_box_aspect(sizes, zoom=_zoom_to_fit(sizes))
+        axes.locator_params(axis="x", nbins=6)
+    else:
+        axes.set_box_aspect(sizes, zoom=1.25 if sizes[0] > 4 * sizes[1] else 1.0)
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     # The plane n·x = 0 under the run, with a grid of two units.
     nx, ny, nz = scene_of(run)["ground"]["normal"]
@@ -111,6 +115,14 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
     axes.tick_params(labelsize=7.5, pad=-1)
     shown = [_body(axes, places[:, k], nodes[:, k], _COLOURS[k], pips) for k in range(places.shape[1])]
     return figure, lambda sample: [artist for show in shown for artist in show(sample)]
+
+
+def _zoom_to_fit(sizes: tuple[float, float, float]) -> float:
+    """Return the zoom at which a box with these sides, as tall as it is to the viewer, leaves room for its labels."""
+    x, y, z = sizes
+    elevation, azimuth = np.radians((_ELEVATION, _AZIMUTH))
+    tall = z * np.cos(elevation) + (x * abs(np.cos(azimuth)) + y * abs(np.sin(azimuth))) * np.sin(elevation)
+    return min(1.25, 0.46 * math.hypot(*sizes) / float(tall))
 
 
 def _motion(run: xr.Dataset) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
