@@ -25,14 +25,15 @@ from stiffdice.dynamics.box_contact.pair_state import PairPhysics, Pairs, are_ne
 from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.inertia import spin_of
-from stiffdice.dynamics.models.pair import TAG
+from stiffdice.dynamics.models.pair import TAG as PAIR_TAG
 from stiffdice.dynamics.state import Array, Physics
 from stiffdice.dynamics.vector import vector
-from stiffdice.integrators.symplectic_euler import LAG, step
+from stiffdice.integrators.symplectic_euler import LAG, TAG, step
 from stiffdice.io.plain_dataset import PlainDataset, PlainVariable
 from stiffdice.scene import validation
 from stiffdice.scene.pair import PairScene
 from stiffdice.simulation import energy_budget
+from stiffdice.simulation.pair.flight import fly
 
 BOOKED = "symplectic_euler"
 
@@ -135,11 +136,15 @@ def _book(
     pair, work, defect = pairs[0], np.zeros(works.shape[1:]), np.zeros(2)
     _look(bare, pair, LAG * h, contacts, both[0])
     views[0] = both[0]
-    for done in range(1, steps + 1):
-        before, after = both[(done - 1) % 2], both[done % 2]
-        step(TAG, physics, pair, h, 0.0)
+    done = looks = 0
+    while done < steps:
+        before, after = both[looks % 2], both[(looks + 1) % 2]
+        taken = fly(TAG, physics, pair, h, min(every - done % every, steps - done))  # as the run does
+        if taken == 0:
+            taken = step(PAIR_TAG, physics, pair, h, 0.0)
         _look(bare, pair, LAG * h, contacts, after)
-        _add(before, after, h, work, defect)
+        _add(before, after, taken * h, work, defect)
+        done, looks = done + taken, looks + 1
         if done % every == 0:
             k = done // every
             views[k], works[k], defects[k] = after, work, defect
@@ -191,7 +196,7 @@ def _set(forces: Any, kind: int, wrenches: tuple[Wrench, Wrench]) -> None:
 
 @njit
 def _add(before: Any, after: Any, h: float, work: Array, defect: Array) -> None:
-    """Add what a step of h [s] between two views did."""
+    """Add what happened in h [s] between two views: a step, or a flight under constant weight."""
     springs, gravity = 0.0, 0.0
     for body in range(2):
         gained = after.kinetic[body] - before.kinetic[body]
