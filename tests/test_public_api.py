@@ -22,6 +22,8 @@ PACKAGE = Path(stiffdice.__file__).parent
 NAMES = [
     *("Scene", "load_scene", "scene_from_mapping"),
     *("simulate", "Run", "Trajectory", "Verdict"),
+    *("PairScene", "load_pair_scene", "pair_scene_from_mapping"),
+    *("simulate_pair", "PairRun", "PairTrajectory", "pair_dataset"),
     *("LaunchDistribution", "land", "Landing", "Rest"),
     *("advise", "Advice", "Option", "run_advised"),
     *("run_dataset", "write_dataset", "open_results"),

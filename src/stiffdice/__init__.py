@@ -4,7 +4,8 @@ A scene (`Scene`) is read from a file (`load_scene`) or from plain data (`scene_
 returns a `Run`: verdict, measures and, if asked, the `Trajectory`. `run_dataset` and `write_dataset` turn a run into a
 dataset of xarray and into a file; `open_results` opens files of runs, sweeps and experiments. `advise` says which
 scheme and how many steps keep an error, and `run_advised` makes that run. `land` throws a die as often as a
-`LaunchDistribution` draws launches, and says which faces are up.
+`LaunchDistribution` draws launches, and says which faces are up. `simulate_pair` runs a scene of two cubes, a
+`PairScene`, and `pair_dataset` turns that run into a dataset.
 
 ```python
 import stiffdice
@@ -54,6 +55,14 @@ _PUBLIC = {
     "Run": "stiffdice.simulation.run:Run",
     "Trajectory": "stiffdice.simulation.run:Trajectory",
     "Verdict": "stiffdice.simulation.outcome:Verdict",
+    # Two cubes that meet, and the energy of each.
+    "PairScene": "stiffdice.scene.pair:PairScene",
+    "load_pair_scene": "stiffdice.scene.pair:load",
+    "pair_scene_from_mapping": "stiffdice.scene.pair:from_mapping",
+    "simulate_pair": "stiffdice.simulation.pair.run:simulate_pair",
+    "PairRun": "stiffdice.simulation.pair.run:PairRun",
+    "PairTrajectory": "stiffdice.simulation.pair.run:PairTrajectory",
+    "pair_dataset": "stiffdice.simulation.pair.dataset:pair_dataset",
     # Many throws of a die, until its faces are decided.
     "LaunchDistribution": "stiffdice.simulation.launch_distribution:LaunchDistribution",
     "land": "stiffdice.simulation.landing:land",

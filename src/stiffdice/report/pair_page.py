@@ -49,20 +49,22 @@ def lines(run: PairRun, name: str) -> list[str]:
 
 
 def _motion(trajectory: PairTrajectory) -> list[str]:
-    """Return how the boxes move when they have parted for the first time, as far as kept states tell, or at the end."""
-    touching = trajectory.contact_energy > 0
+    """Return how the boxes move once they have parted first, as far as kept states tell, and at the end; energies."""
+    touching, whole = trajectory.contact_energy > 0, trajectory.mechanical_energy
     parted = np.flatnonzero(touching[:-1] & ~touching[1:]) + 1
-    k, told = (parted[0], "parted") if len(parted) else (-1, "ended")
-    moving = [
-        f"cube {number}: {_vector(state['velocity'])} m/s, spin {_vector(state['angular_velocity'])} rad/s"
-        for number, state in enumerate((trajectory.state["a"][k], trajectory.state["b"][k]))
-    ]
-    whole = trajectory.mechanical_energy
-    return [
-        f"  {told}    at t = {trajectory.time[k]:.4g} s, {moving[0]}",
-        f"            {'':{len(f'at t = {trajectory.time[k]:.4g} s,')}} {moving[1]}",
-        f"  budget    {whole[0]:.6g} J at the launch, {whole[-1]:.6g} J at the end, springs included",
-    ]
+    said = [line for k in parted[:1] for line in _moving(trajectory, "parted", k)]
+    said += _moving(trajectory, "ended", -1)
+    return [*said, f"  budget    {whole[0]:.6g} J at the launch, {whole[-1]:.6g} J at the end, springs included"]
+
+
+def _moving(trajectory: PairTrajectory, event: str, k: int) -> list[str]:
+    at = f"t = {trajectory.time[k]:.4g} s"
+    said = []
+    for number, (head, body) in enumerate(((f"  {event:9} {at:13}", "a"), (" " * 25, "b"))):
+        state = trajectory.state[body][k]
+        moving = f"{_vector(state['velocity'])} m/s, spin {_vector(state['angular_velocity'])} rad/s"
+        said.append(f"{head} cube {number}: {moving}")
+    return said
 
 
 def _vector(v: Array) -> str:

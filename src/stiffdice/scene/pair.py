@@ -28,6 +28,7 @@ class PairScene:
     """Two boxes, each with its launch, that meet each other and the ground; its stiffness and damping are theirs, too.
 
     parts: each box on the ground as if it were alone, with the same ground, gravity and duration.
+
     Raises InputError where they differ in those, and for a contact law that is not gated.
     """
 

@@ -190,6 +190,8 @@ def from_mapping(mapping: object, preset: str | None = None) -> Scene:
 
     Raises InputError naming the key, the value and what is allowed.
     """
+    if isinstance(mapping, Mapping) and "cubes" in mapping:
+        raise InputError("cubes: allowed here is a scene of one cube; stiffdice run takes two")
     top = validation.known_keys("", _given(mapping), _TOP_KEYS)
     sections = {name: dict(validation.known_keys(name, _given(top.get(name)), _KEYS[name])) for name in _SECTIONS}
     chosen = preset if preset is not None else top.get("preset")

@@ -55,6 +55,7 @@ VERDICT_LOOKS: dict[str, dict[str, str]] = {
     "sank": {"color": "#56B4E9"},
     "undecided": {"color": "#ffffff", "hatch": "//////"},
     "stalled": {"color": PURPLE},
+    "deep": {"color": BLUE},
     "blew_up": {"color": "#B33C00"},
     "left_numeric_range": {"color": INK},
 }

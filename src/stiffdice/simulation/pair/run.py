@@ -28,10 +28,10 @@ TOLERANCE = 0.05
 class PairTrajectory:
     """Every K-th state of two boxes; all arrays have shape (time,).
 
-    step: how many steps were done. time [s]: since the launch. state: records of both, `a` and `b` with the fields of a
-    single body's. kinetic_energy, potential_energy [J]: of both. elastic_energy [J]: in the ground's springs.
-    contact_energy [J]: in the springs between the boxes. mechanical_energy [J]: all four, the velocity at the time of
-    the place.
+    step: how many steps were done. time [s]: since the launch. state: records of both, `a` and `b` with the fields of
+    those in a single body's trajectory. kinetic_energy [J]: of both, of translation and rotation. potential_energy [J]:
+    m g z of both centres. elastic_energy [J]: in the ground's springs. contact_energy [J]: in the springs between the
+    boxes. mechanical_energy [J]: all four, the velocity at the time of the place.
     """
 
     step: npt.NDArray[np.int64]
@@ -48,8 +48,11 @@ class PairTrajectory:
 class PairRun:
     """A run of two boxes, or of many launches of them; arrays have shape (member,).
 
-    energy_ratio [1]: largest energy in the air, over that of the launch, counted from both boxes at rest on the ground.
-    deepest [m]: contact between the boxes. meetings: how often they have begun to touch. end: states at the end.
+    scene: the problem. scheme: of the time steps. steps: their number to the scene's duration. verdict: int8, the
+    `Verdict`. steps_done: int64, fewer than `steps` where a run could not go on. energy_ratio [1]: largest energy in
+    the air, over that of the launch, counted from both boxes at rest on the ground. deepest [m]: contact between the
+    boxes. meetings: how often they have begun to touch. end: states at the end, records of both, `a` and `b`.
+    trajectory: None if no state was kept.
     """
 
     scene: PairScene
@@ -81,12 +84,13 @@ def simulate_pair(
     steps: int = 10_000,
     every: int = 0,
     launches: Pairs | None = None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Callable[[float], None] | None = None,
 ) -> PairRun:
     """Return a run of two boxes.
 
-    scheme: of the time steps. steps: to the scene's duration. every: keep each K-th state, none if 0. launches: records
-    of PAIR, shape (member,), in place of the scene's launch. progress: called with the share of the steps done.
+    scene: the problem. scheme: of the time steps. steps: to the scene's duration. every: keep each K-th state, none if
+    0. launches: records of PAIR, shape (member,), in place of the scene's launch. progress: called with the share of
+    the steps done.
 
     Raises InputError for values out of range, for a scheme that does not apply, and for a trajectory of many launches.
     """
@@ -104,7 +108,8 @@ def simulate_pair(
     samples[0] = pairs[0]
     begin(physics, pairs, memory)
     while march(schemes.SCHEMES[scheme], physics, pairs, memory, samples, limits, schemes.TOLERANCE):
-        progress(float(memory["done"].mean()) / steps)
+        if progress is not None:
+            progress(float(memory["done"].mean()) / steps)
     ratio = 1.0 + (memory["airborne"] - memory["launch"]) / _scale(scene, memory["launch"])
     applies: dict[Verdict, Any] = {
         Verdict.ENERGY_GREW: ~(ratio <= 1.0 + TOLERANCE),
