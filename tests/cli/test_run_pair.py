@@ -80,6 +80,28 @@ def test_momentum_is_the_same_before_and_after_they_meet(stiffdice):
     np.testing.assert_allclose(turn[:, 2], turn[0, 2], atol=1e-12)  # about z, the weight has no torque
 
 
+def test_the_stack_of_the_example_stays_and_sinks_in_by_its_weight(stiffdice):
+    assert stiffdice("run", STACK, "--every", "10", "-o", "out.h5")[0] == 0
+    found = public.open_results("out.h5")
+    assert (found.velocity[-100:] ** 2).max() < 1e-6
+    heights = found.position.sel(axis="z")[-1].values
+    sag = 9.8 / (4 * 1e4)  # m g/(4 S)
+    np.testing.assert_allclose(heights, [0.2 - 2 * sag, 0.6 - 3 * sag], atol=1e-6)
+    assert float(found.deepest_contact) == pytest.approx(2 * sag, rel=0.01)  # let go with damping: nearly twice
+    assert abs(found.position.sel(axis=["x", "y"])).max() < 1e-4
+
+
+def test_the_cubes_of_the_example_meet_in_the_air_and_come_to_rest(stiffdice):
+    assert stiffdice("run", TWO, "-o", "out.h5")[0] == 0
+    found = public.open_results("out.h5")
+    first = int((found.contact_energy.values > 0).argmax())
+    lowest = (found.position + found.node_offset).sel(axis="z").min("node")
+    assert (lowest[: first + 1] > 0.5).all()
+    assert float(found.elastic_energy[: first + 1].max()) == 0
+    assert (found.velocity[-1] ** 2).max() < 1e-4
+    np.testing.assert_allclose(found.position.sel(axis="z")[-1], 0.2 - 9.8 / 4e4, atol=1e-4)
+
+
 def test_every_option_is_heard(stiffdice):
     changes = ["--set", "cubes.0.launch.velocity=[3, 0, 1]", "--set", "ground.stiffness=2e4"]
     options = [

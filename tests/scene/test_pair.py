@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import pytest
 import yaml
 
 from stiffdice.errors import InputError
+from stiffdice.io import yaml_loader
 from stiffdice.scene import pair
 from stiffdice.scene import scene as scenes
 
@@ -106,6 +109,12 @@ def test_bad_changes_are_told_in_one_line_with_file_and_key(two, changes, told):
 def test_a_restitution_gives_equal_cubes_one_damping():
     scene = pair.from_mapping({"cubes": [{}, {}], "ground": {"restitution": 0.5}})
     assert scene.ground == scenes.from_mapping({"ground": {"restitution": 0.5}}).ground
+
+
+def test_the_example_of_the_page_on_scenes_is_one():
+    page = (Path(__file__).parents[2] / "config" / "README.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```yaml\n(cubes:.*?)```", page, re.DOTALL)
+    assert pair.from_mapping(yaml_loader.parse(example)).cubes[1].sides == (0.4, 0.3, 0.5)
 
 
 def test_two_cubes_are_told_by_their_key():

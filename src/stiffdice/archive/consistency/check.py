@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from stiffdice.archive.consistency import equations
+from stiffdice.archive.consistency import equations, pairs
 from stiffdice.errors import InputError
 from stiffdice.scene.flat_landing import CONTACT_LAWS
 from stiffdice.simulation import energy_budget
@@ -25,6 +25,7 @@ from stiffdice.sweep import stability_limits
 # What of a file the checks here do not see, by its kind.
 NOT_SEEN = {
     "run": "motion of runs from state to state, touch-down phases and measures (a rebuild computes them again)",
+    "pair": "motion of two cubes from state to state, and how they met (another run computes them again)",
     "shard": "numbers of shards apart from their sweep",
     "sweep": "numbers of sweeps and surveys apart from their shards",
     "frontier": "numbers of frontiers apart from their sweep",
@@ -33,6 +34,7 @@ NOT_SEEN = {
 
 # By what a file must hold to be one; the first that fits.
 _KINDS = {
+    "pair": ({"time", "position", "contact_energy"}, pairs.of_pair),
     "run": ({"time", "position", "kinetic_energy"}, equations.of_run),
     "shard": ({"cell", "member", "verdict", "steps_done"}, equations.of_shard),
     "sweep": ({"cell", "failing", "verdicts"}, equations.of_cells),
@@ -56,7 +58,7 @@ _COUNTED = ("criterion", "verdict", "axis", "edge")
 
 
 def kind_of(dataset: xr.Dataset) -> str:
-    """Return `run`, `shard`, `sweep` or `frontier`; `experiment` for any other."""
+    """Return `run`, `pair`, `shard`, `sweep` or `frontier`; `experiment` for any other."""
     there = {*dataset.variables, *dataset.sizes}
     return next(kind for kind, (names, _) in _KINDS.items() if names <= there)
 
@@ -64,8 +66,8 @@ def kind_of(dataset: xr.Dataset) -> str:
 def problems(dataset: xr.Dataset) -> list[str]:
     """Return a line for everything in a file that cannot be so: variable, place, value, and what is allowed.
 
-    Checked are, of a run: counts, energies, the rigid body, the verdict, the ledger of the energy; of shards and
-    sweeps: counts and verdicts.
+    Checked are, of a run of one cube or two: counts, energies, rigid bodies, the verdict, the ledger of the energy; of
+    shards and sweeps: counts and verdicts.
     """
     kind = kind_of(dataset)
     try:

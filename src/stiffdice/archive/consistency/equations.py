@@ -16,7 +16,7 @@ import xarray as xr
 
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.energy import energies
-from stiffdice.dynamics.state import TURNING, physics_of, start_of
+from stiffdice.dynamics.state import TURNING, Array, physics_of, start_of
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.scene import scene as scenes
 from stiffdice.scene.scene import Scene
@@ -58,14 +58,15 @@ _SHARED = (
 def of_run(dataset: xr.Dataset) -> list[str]:
     """Return a line for everything in a run's file that cannot be so."""
     scene = scenes.from_mapping(json.loads(dataset.attrs["scene"]))
-    if found := _counts(dataset, scene):  # what follows stands on them
-        return found
     steps, done = int(dataset.attrs["steps"]), int(dataset["steps_done"])
+    omega_h = linear_theory.omega_h(scene, steps)
+    if found := counts(dataset, scene.duration, omega_h, "√(4 S/m) times the step size"):  # what follows stands on them
+        return found
     whole = done == steps or int(dataset["verdict"]) in _EARLY
     measures = {part.MEASURE: float(dataset.get(part.MEASURE, np.nan)) for part in CRITERIA.values()}
     found = [
         *_energies(dataset, scene),
-        *_rigid(dataset, scene),
+        *(_rigid(dataset, scene) if str(dataset.attrs["model"]) in TURNING else []),
         *outside("steps_done", done, whole, "all steps, or a verdict that ends a run early"),
         *_verdicts(dataset, measures),
     ]
@@ -108,12 +109,14 @@ def _verdicts(dataset: xr.Dataset, measures: Mapping[str, npt.ArrayLike]) -> lis
     return found + outside("verdict", stored, (stored == strict) | (stored == lenient), "what its measures say")
 
 
-def _counts(dataset: xr.Dataset, scene: Scene) -> list[str]:
-    """Every K-th step from the launch on, as far as the run went; the time of a step is step/steps of the duration."""
+def counts(dataset: xr.Dataset, duration: float, omega_h: float, why: str) -> list[str]:
+    """Every K-th step from the launch on, as far as the run went; the time of a step is step/steps of the duration.
+
+    omega_h [1]: of the run's fastest contact; why: what it is.
+    """
     steps, done, step = int(dataset.attrs["steps"]), int(dataset["steps_done"]), dataset["step"].values
-    h, omega_h = scene.duration / steps, linear_theory.omega_h(scene, steps)
+    h, right = duration / steps, step / steps * duration
     every = max(1, int(step[1] - step[0])) if len(step) > 1 else 1
-    right, why = step / steps * scene.duration, "√(4 S/m) times the step size"
     found = [
         *unequal("step_size", dataset.attrs["step_size"], h, 2 * ROUNDING * h, "duration / steps"),
         *unequal("omega_h", dataset.attrs["omega_h"], omega_h, 8 * ROUNDING * omega_h, why),
@@ -152,17 +155,22 @@ def _rigid(dataset: xr.Dataset, scene: Scene) -> list[str]:
 
     A turn needs a force, so there are not more of them than evaluations, or than steps of free flight.
     """
-    if str(dataset.attrs["model"]) not in TURNING:
-        return []
-    nodes, offsets = scene.cube.node_offsets(), dataset["node_offset"].values
+    return rigid(dataset["node_offset"].values, scene, max(int(dataset["steps_done"]), int(dataset["evaluations"])))
+
+
+def rigid(offsets: Array, scene: Scene, turns: int) -> list[str]:
+    """The same of offsets, shape (time, 8, 3), after at most so many turns."""
+    nodes = scene.cube.node_offsets()
     first, second = np.triu_indices(len(nodes), 1)
     right = np.linalg.norm(nodes[first] - nodes[second], axis=1)
     found = np.linalg.norm(offsets[:, first] - offsets[:, second], axis=2)
-    turns = 16 + max(int(dataset["steps_done"]), int(dataset["evaluations"]))
-    room = _ROUNDINGS_OF_A_TURN * ROUNDING * turns * physics_of(scene).reach
+    length = np.linalg.norm(offsets.sum(axis=1), axis=1)
+    room = _ROUNDINGS_OF_A_TURN * ROUNDING * (16 + turns) * physics_of(scene).reach
     return [
         *unequal("distances between nodes of node_offset", found, right, room, "the cube's, which is rigid"),
-        *unequal("sum of node_offset", offsets.sum(axis=1), 0.0, 8 * room, "the centre is amid the nodes"),
+        *unequal(
+            "length of the sum of node_offset", length, np.linalg.norm(nodes.sum(axis=0)), 14 * room, "the cube's"
+        ),
     ]
 
 
