@@ -27,7 +27,7 @@ def suite():
     return suite
 
 
-@pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier", "experiment"])
+@pytest.mark.parametrize("kind", ["run", "pair", "shard", "sweep", "frontier", "experiment"])
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.long
 def test_files_keep_the_cf_conventions(written, tmp_path, suite, kind):
@@ -37,7 +37,7 @@ def test_files_keep_the_cf_conventions(written, tmp_path, suite, kind):
     assert errors == {}
     assert len(groups) > 20
     found = {group.name: set(group.msgs) for group in groups if group.value[0] != group.value[1]}
-    assert found == {name: {text} for name, text in MEANT.items() if kind == "run"}
+    assert found == {name: {text} for name, text in MEANT.items() if kind in ("run", "pair")}
 
 
 @pytest.mark.filterwarnings("ignore")

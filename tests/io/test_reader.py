@@ -13,7 +13,7 @@ import xarray as xr
 
 from stiffdice.io.reader import open_file
 
-KINDS = ("run", "shard", "sweep", "frontier", "experiment")
+KINDS = ("run", "pair", "shard", "sweep", "frontier", "experiment")
 
 
 def tool(name, package):

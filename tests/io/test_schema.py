@@ -17,7 +17,7 @@ STORED = Path(__file__).parents[1] / "reference" / "formats" / FORMAT_VERSION
 PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
 
 
-@pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier", "experiment"])
+@pytest.mark.parametrize("kind", ["run", "pair", "shard", "sweep", "frontier", "experiment"])
 @pytest.mark.long
 def test_what_is_written_is_as_the_format_says(written, kind):
     dataset = open_file(written[kind])
@@ -42,7 +42,7 @@ def test_the_page_has_a_line_for_everything():
 
 
 @pytest.mark.parametrize("stored", [True, False], ids=["stored", "written"])
-@pytest.mark.parametrize("kind", ["run", "shard", "sweep", "frontier"])
+@pytest.mark.parametrize("kind", ["run", "pair", "shard", "sweep", "frontier"])
 def test_names_in_files_are_those_of_the_schema(written, kind, stored):
     """Those of stored files do not change. The words of an enum are its writer's, a measure's name its criterion's."""
     dataset = open_file(STORED / f"{kind}.h5" if stored else written[kind])
