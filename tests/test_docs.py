@@ -35,6 +35,7 @@ PAGES = [
     "docs/stability.md",
     "docs/tradeoff.md",
     "docs/engines.md",
+    "docs/pair.md",
     "docs/pair-engines.md",
     "docs/engines-drake.md",
     "docs/engines-mujoco-pybullet.md",
