@@ -77,6 +77,12 @@ def test_all_patches_of_two_faces_are_equally_stiff():
             assert stiffness((*place, ABOVE), turned(0, 0, twist)) == pytest.approx(4, rel=1e-11)
 
 
+def test_a_small_cube_on_a_large_one_is_as_stiff_as_an_equal_one():
+    place = np.array([[0.1, -0.2, 0.65 - DEPTH]])
+    energy = energies((UNIT, [0.3, 0.3, 0.3]), place, ([Rotation.identity()], [turned(0, 0, 0.4)]))[0]
+    assert 2 * energy / DEPTH**2 == pytest.approx(4, rel=1e-11)
+
+
 def test_a_node_in_a_face_is_one_spring_and_an_edge_two():
     corner = Rotation.align_vectors([[0, 0, -1]], [[1, 1, 1]])[0]
     assert stiffness((0.1, 0.2, (0.5 + math.sqrt(0.75), DEPTH)), corner) == pytest.approx(1, rel=1e-12)
