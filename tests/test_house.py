@@ -104,7 +104,7 @@ CHANGES = {
         ('    "jobs": "benchmarks.jobs",\n', '    "jobs": "benchmarks.jobs",\n    "nothing": "benchmarks.nothing",\n')
     ],
     "cli/main.py": [
-        ("import advise, archive, diff,", "import advise, archive, diff, greet,"),
+        ("import advise, diff,", "import advise, diff, greet,"),
         ("in (run, advise,", "in (greet, run, advise,"),
     ],
     "scene/flat_landing.py": [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 import shlex
 from pathlib import Path
@@ -32,8 +31,8 @@ COMMANDS = [
 
 def examples(command: str) -> list[list[str]]:
     """Return the words of every example of a command's help."""
-    module = importlib.import_module(f"stiffdice.cli.{command}" if command else "stiffdice.cli.main")
-    lines = module.EXAMPLES.split("\n\n")[0].splitlines()
+    told = cli.COMMANDS[command].EXAMPLES if command else cli.EXAMPLES
+    lines = told.split("\n\n")[0].splitlines()
     assert lines[0] == "examples:"
     return [shlex.split(line, comments=True) for line in lines[1:]]
 

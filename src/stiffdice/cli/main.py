@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, archive, diff, infer, inspect, rebuild, run, status, throw, tosses, verify
+from stiffdice.cli import advise, diff, infer, inspect, run, status, throw, tosses
+from stiffdice.cli.archives import archive, rebuild, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
 
@@ -31,6 +32,12 @@ examples:
   stiffdice status quick
   stiffdice verify results/quick
 """
+
+# By name, in the order in which they are told.
+COMMANDS = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (run, advise, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
+}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -62,9 +69,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in (run, advise, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild):
+    for name, module in COMMANDS.items():
         command = commands.add_parser(
-            module.__name__.rpartition(".")[2],
+            name,
             help=module.HELP,
             description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
             epilog=module.EXAMPLES,
