@@ -17,6 +17,7 @@ COMMANDS = [
     "",
     "run",
     "advise",
+    "ground",
     "throw",
     "tosses",
     "infer",
@@ -85,7 +86,7 @@ def test_examples_name_what_is_there_and_options_that_are(command):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", ["run", "advise"])
+@pytest.mark.parametrize("command", ["run", "advise", "ground"])
 def test_examples_run(command, tmp_path):
     (tmp_path / "config").symlink_to(ROOT / "config")
     for words in examples(command):

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, diff, infer, inspect, run, status, throw, tosses
+from stiffdice.cli import advise, diff, ground, infer, inspect, run, status, throw, tosses
 from stiffdice.cli.archives import archive, rebuild, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
@@ -23,6 +23,7 @@ examples:
   stiffdice run config/scenes/figure-09.yaml --dt '0.1 ms' --set ground.stiffness='500 kN/m' -o softer.h5
   stiffdice run config/scenes/figure-04.yaml --model auto -o throw.h5
   stiffdice advise config/scenes/figure-04.yaml --error 1%
+  stiffdice ground --restitution 0.5 --mass '4 g' --side '16 mm' --drop '30 cm' --depth '0.1 mm'
   stiffdice throw --count 100000
   stiffdice tosses --data config/measurements/tosses.h5
   stiffdice infer config/measurements/labby-2009.yaml
@@ -36,7 +37,7 @@ examples:
 # By name, in the order in which they are told.
 COMMANDS = {
     module.__name__.rpartition(".")[2]: module
-    for module in (run, advise, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
+    for module in (run, advise, ground, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
 }
 
 
