@@ -78,6 +78,14 @@ def test_a_material_is_a_restitution_with_a_source(capsys):
         ([*ASKED[1:], "--engine", "mujoko"], "--engine = mujoko: allowed is mujoco or pybullet or drake; did you mean"),
         ([*ASKED[1:], "--timestep", "1e-5"], "--timestep: allowed is beside --engine only"),
         ([*ASKED[1:], "--material", "granite"], "--material: is a restitution; give no other"),
+        (
+            [*DIE, "--stiffness", "2e5", "--damping", "1e300", "--speed", "1"],
+            "restitution = 0: allowed where steps are",
+        ),
+        (
+            [*DIE, "--restitution", "0.5", "--depth", "1e-20", "--speed", "1"],
+            "depth = 1e-20 m: allowed where steps are",
+        ),
         (["--material", "granit", *DIE, "--speed", "1", "--depth", "1 mm"], "--material = granit: allowed is granite"),
         ([*DIE, "--restitution", "0.5", "--depth", "1 kg", "--speed", "1"], "--depth = 1 kg: kg is no unit of [m]"),
     ],
@@ -88,6 +96,13 @@ def test_what_is_wrong_is_one_line(arguments, message, capsys):
     assert captured.out == ""
     assert message in captured.err
     assert captured.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("ground", [["2e5", "1e300"], ["1e-300", "1"], ["2e5", "0"]])
+def test_any_ground_has_its_numbers(ground, capsys):
+    stiffness, damping = ground
+    asked = [*DIE, "--stiffness", stiffness, "--damping", damping, "--speed", "2", "--quick"]
+    assert "ground: {stiffness: " in told(capsys, "ground", *asked)
 
 
 def test_a_soft_ground_is_warned_of(capsys):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiffdice.advice import engine_parameters
+from stiffdice.advice import engine_parameters, step_limits
 from stiffdice.advice.contact_design import Contact
 from stiffdice.advice.engine_parameters import compensated
 from stiffdice.advice.step_limits import CRITERIA, bounces
@@ -96,9 +96,11 @@ def _keeps(found: tuple[float, float], criterion: str, exact: float) -> bool:
 def climbed(engine: str, contact: Contact, timestep: float | None = None) -> Ladder:
     """Return the ladder of an engine: predicted, and measured where it is installed.
 
-    timestep [s]: one more. Raises InputError for a contact law that the engine does not have.
+    timestep [s]: one more. Raises InputError for a contact law that the engine does not have, and for a contact whose
+    bounces cannot be measured.
     """
     engine_parameters.check(contact)
+    step_limits.check(contact)
     ways = WAYS[engine]
     try:
         version, installed = engines.adapter_of(engine).version(), True

@@ -66,7 +66,9 @@ def mujoco(contact: Contact, h: float) -> Parameters:
         constant = 4 / (scale * contact.zeta * contact.omega)
         values["solref_positive"] = f"{constant:.9g} {contact.zeta * math.sqrt(scale) / 2:.9g}"
         if constant < 2 * h:
-            notes.append("the positive form does not hold at this timestep: MuJoCo takes no time constant below two")
+            notes.append(
+                "the positive form does not hold at this timestep: MuJoCo takes no time constant below two of them"
+            )
     else:
         notes.append("there is no positive form without damping")
     return Parameters(values, mjcf(contact, h, negative), notes)
@@ -130,7 +132,7 @@ def drake(contact: Contact, h: float) -> Parameters:
 plant, _ = AddMultibodyPlantSceneGraph(builder, time_step={h:.9g})
 plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
 plant.set_sap_near_rigid_threshold(0.0)
-ground = ProximityProperties()  # the body's: relaxation_time 0; at points, stiffness 1e20
+ground = ProximityProperties()  # the body's: relaxation_time 0; at points, stiffness {2.0**60 * ground.stiffness:.3g}
 ground.AddProperty("material", "relaxation_time", {time:.9g})
 # Points: spheres at the corners, and
 AddContactMaterial(ground, point_stiffness={ground.stiffness:.9g})

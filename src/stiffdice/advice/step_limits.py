@@ -17,6 +17,7 @@ import numpy as np
 from stiffdice.advice.contact_design import Contact
 from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import STATE, Array, start_of
+from stiffdice.errors import InputError
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import flat_landing
@@ -34,6 +35,10 @@ CRITERIA = {"energy": 0.05, "restitution_5": 0.05, "restitution_1": 0.01, "path"
 LEAST, _FACTOR, MOST = 1e-4, 10 ** (1 / 12), 4.0
 _MAGIC = 32
 PHASES = 12
+
+# Of the restitution [1], below which a cube leaves the ground ever more slowly; and of the depth v/ω in sides, below
+# which round-off in the height is seen in the phases.
+_RESTITUTION, _DEPTH = 1e-3, 1e-8
 
 # A bounce is followed for so many times what it should take, and for some steps more.
 _PATIENCE, _MORE = 1.3, 8
@@ -59,8 +64,21 @@ class Bounces(NamedTuple):
     off: Array
 
 
+def check(contact: Contact) -> None:
+    """Raise InputError for a contact whose bounces cannot be measured."""
+    if contact.restitution < _RESTITUTION:
+        raise InputError(
+            f"restitution = {contact.restitution:.3g}: allowed where steps are measured is {_RESTITUTION:g} or more"
+        )
+    if contact.speed / contact.omega < _DEPTH * contact.scene.cube.side:
+        raise InputError(
+            f"depth = {contact.depth:.3g} m: allowed where steps are measured is {_DEPTH:g} of the side or more"
+        )
+
+
 def limits(contact: Contact, scheme: str) -> Limits:
-    """Return the longest steps of a scheme of fixed steps on a ground."""
+    """Return the longest steps of a scheme of fixed steps on a ground; raises InputError as `check` does."""
+    check(contact)
     hardest = linear_stability.hardest(contact.scene, "tumbling")
     linear = linear_stability.stability_limit(scheme, hardest.zeta) / hardest.omega
     kept = dict.fromkeys(CRITERIA, math.inf)

@@ -130,6 +130,8 @@ def _told(options: argparse.Namespace, contact: Contact, timestep: float | None)
     engine = options.engine and validation.choice("--engine", options.engine, engine_parameters.ENGINES)
     if engine:
         engine_parameters.check(contact)
+    if engine or not options.quick:
+        step_limits.check(contact)
     with notes("ground: measuring") as tell:
         if not options.quick:
             limits = {}

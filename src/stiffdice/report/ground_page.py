@@ -86,6 +86,7 @@ def ladder_lines(ladder: Ladder, contact: Contact) -> list[str]:
         head if ladder.installed else f"{ladder.engine} is not measured: {ladder.version}",
         *aligned(rows),
         f"predicted: {engine_ladder.LIKE_WORDS[ladder.engine]}",
+        *(["–: D is less than S h"] if any(column.way == engine_ladder.LESS for column in columns) else []),
         "",
         *aligned(kept),
     ]
