@@ -90,6 +90,7 @@ def test_the_printed_lines_bounce_in_pybullet(restitution):
     assert speed / SPEED == pytest.approx(restitution, rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("restitution", [0.5, 0.9])
 def test_the_printed_hydroelastic_ground_bounces_in_drake(restitution):
     """The lines themselves, with a rigid box."""
