@@ -31,6 +31,7 @@ PAGES = [
     "docs/api.md",
     "docs/method.md",
     "docs/advice.md",
+    "docs/ground.md",
     "docs/speed.md",
     "docs/stability.md",
     "docs/tradeoff.md",
@@ -207,6 +208,24 @@ def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
     for arguments, output in examples:
         assert main(arguments) == 0
         assert without_times(capsys.readouterr().out) == without_times(output)
+
+
+def grounds() -> list[tuple[list[str], list[str]]]:
+    """Return the arguments of each `ground` that a page shows, and the lines of its output that are shown."""
+    example = r"^```sh\nstiffdice (ground [^\n]*)\n```\n\n```text\n(.*?)^```"
+    blocks = re.findall(example, (ROOT / "docs/ground.md").read_text(), re.MULTILINE | re.DOTALL)
+    return [(shlex.split(command), output.splitlines()) for command, output in blocks]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("arguments", "lines"), grounds())
+def test_the_ground_that_is_shown_is_what_the_command_says(arguments, lines, capsys):
+    """Some of its lines, in their order, where the engine is there."""
+    if "--engine" in arguments:
+        pytest.importorskip(arguments[-1])
+    assert main(arguments) == 0
+    told = iter(capsys.readouterr().out.splitlines())
+    assert [line for line in lines if line not in told] == []
 
 
 @pytest.mark.parametrize("page", PAGES)

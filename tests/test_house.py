@@ -108,7 +108,7 @@ CHANGES = {
         ('    "jobs": "benchmarks.jobs",\n', '    "jobs": "benchmarks.jobs",\n    "nothing": "benchmarks.nothing",\n')
     ],
     "cli/main.py": [
-        ("import advise, archive, diff,", "import advise, archive, diff, greet,"),
+        ("import advise, diff, ground,", "import advise, diff, greet, ground,"),
         ("in (run, advise,", "in (greet, run, advise,"),
     ],
     "scene/flat_landing.py": [

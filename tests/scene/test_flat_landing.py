@@ -104,3 +104,26 @@ def test_a_run_has_the_restitution_that_was_asked_for(law, restitution, ground):
     )
     assert measured(scene, "exact") == pytest.approx(restitution, abs=1e-3)
     assert measured(scene, "event") == pytest.approx(restitution, abs=1e-3)
+
+
+@pytest.mark.parametrize("law", sorted(CONTACT_LAWS))
+@pytest.mark.parametrize("restitution", [0.01, 0.1, 0.2, 0.3, 0.5, 0.9, 1.0])
+def test_depth_and_force_are_the_largest_of_the_oscillator(law, restitution):
+    """Followed along the way in; on the way out the cube is nearer and the force less."""
+    speed, zeta = 3.0, flat_landing.damping_ratio(law, restitution)
+    approach = CONTACT_LAWS[law].approach_damping * zeta
+    times = np.linspace(0, flat_landing.leg(approach), 1001)
+    places, speeds = np.array([after(Oscillator(1.0, approach, 0.0, -speed), time) for time in times]).T
+    assert flat_landing.depth(law, zeta) * speed == pytest.approx(-places.min(), rel=1e-5)
+    largest = (-places - 2 * approach * speeds).max()
+    assert flat_landing.peak_force(law, zeta) * speed == pytest.approx(largest, rel=1e-5)
+
+
+@given(laws, st.floats(0.05, 0.99), st.floats(1e-5, 1e-2), st.floats(0.01, 10), st.floats(1e-3, 1))
+def test_a_ground_of_a_depth_is_that_of_its_contact_time(law, restitution, deepest, speed, mass):
+    stiffness = flat_landing.stiffness_of_depth(law, restitution, deepest, speed, mass)
+    zeta = flat_landing.damping_ratio(law, restitution)
+    omega = 2 * math.sqrt(stiffness / mass)
+    assert flat_landing.depth(law, zeta) * speed / omega == pytest.approx(deepest, rel=1e-12)
+    same = flat_landing.stiffness(law, restitution, flat_landing.duration(law, zeta) / omega, mass)
+    assert same == pytest.approx(stiffness, rel=1e-12)

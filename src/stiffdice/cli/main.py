@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, archive, diff, infer, inspect, rebuild, run, status, throw, tosses, verify
+from stiffdice.cli import advise, diff, ground, infer, inspect, run, status, throw, tosses
+from stiffdice.cli.archives import archive, rebuild, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
 
@@ -22,6 +23,7 @@ examples:
   stiffdice run config/scenes/figure-09.yaml --dt '0.1 ms' --set ground.stiffness='500 kN/m' -o softer.h5
   stiffdice run config/scenes/figure-04.yaml --model auto -o throw.h5
   stiffdice advise config/scenes/figure-04.yaml --error 1%
+  stiffdice ground --restitution 0.5 --mass '4 g' --side '16 mm' --drop '30 cm' --depth '0.1 mm'
   stiffdice throw --count 100000
   stiffdice tosses --data config/measurements/tosses.h5
   stiffdice infer config/measurements/labby-2009.yaml
@@ -31,6 +33,12 @@ examples:
   stiffdice status quick
   stiffdice verify results/quick
 """
+
+# By name, in the order in which they are told.
+COMMANDS = {
+    module.__name__.rpartition(".")[2]: module
+    for module in (run, advise, ground, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
+}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -62,9 +70,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"stiffdice {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for module in (run, advise, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild):
+    for name, module in COMMANDS.items():
         command = commands.add_parser(
-            module.__name__.rpartition(".")[2],
+            name,
             help=module.HELP,
             description=f"{module.HELP[0].upper()}{module.HELP[1:]}.",
             epilog=module.EXAMPLES,

@@ -1,4 +1,4 @@
-"""A flat landing without gravity: its restitution and its duration, and the ground that has them.
+"""A flat landing without gravity: restitution, duration, depth and force, and the ground that has them.
 
 Four nodes touch the ground at once. Along the normal the cube is a damped oscillator, z'' + 2ζω z' + ω² z = 0 with
 ω² = 4S/m and ζ = D/√(S m), from z = 0 at speed v inwards, on a ground that cannot pull: contact ends when its force is
@@ -74,4 +74,36 @@ def damping(law: str, restitution: float, stiffness: float, mass: float) -> floa
 def stiffness(law: str, restitution: float, contact_time: float, mass: float) -> float:
     """Return S [kg/s²] per node, of a ground with a restitution [1] and a contact time [s], for a cube's mass [kg]."""
     omega = duration(law, damping_ratio(law, restitution)) / contact_time
+    return mass * omega * omega / 4
+
+
+def depth(law: str, zeta: float) -> float:
+    """Return the deepest penetration [v/ω] of a landing at a speed v, where the cube turns.
+
+    From the invariant above: ω² z² = v² exp(−2ζ_in ω t_in) at z' = 0.
+    """
+    approach = CONTACT_LAWS[law].approach_damping * zeta
+    return math.exp(-approach * leg(approach))
+
+
+def peak_force(law: str, zeta: float) -> float:
+    """Return the largest force of the ground [m v ω], of a cube of mass m that lands at a speed v.
+
+    With ζ = cos φ, z'' ∝ exp(−ζωt) sin(ω_d t − 2φ) and z''' ∝ exp(−ζωt) sin(ω_d t − 3φ): the force is largest at
+    ω_d t = 3φ − π, before the turn, and is m v ω exp(−ζωt) there. From ζ = 1/2 on it is so at touch-down, where the
+    dashpots alone push with 2ζ m v ω. All of ζ_in.
+    """
+    approach = CONTACT_LAWS[law].approach_damping * zeta
+    if approach >= 0.5:
+        return 2 * approach
+    angle = 3 * math.acos(approach) - math.pi
+    return math.exp(-approach * angle / math.sqrt((1 - approach) * (1 + approach)))
+
+
+def stiffness_of_depth(law: str, restitution: float, deepest: float, speed: float, mass: float) -> float:
+    """Return S [kg/s²] per node, of a ground with a restitution [1] into which a cube goes so deep [m].
+
+    speed [m/s]: of the landing. mass [kg]: the cube's.
+    """
+    omega = depth(law, damping_ratio(law, restitution)) * speed / deepest
     return mass * omega * omega / 4

@@ -135,3 +135,23 @@ def _compiled(run: Mujoco) -> mujoco.MjModel:
     # The first number is of no effect, but both at zero stand for the normal direction's. MuJoCo divides by d.
     compiled.pair_solreffriction[:] = -1.0, -_IMPEDANCE / run.h
     return compiled
+
+
+def rebounds(model: str, height: float, speed: float, clearances: Array, steps: int) -> Array:
+    """Return the speeds [m/s] of a body some steps after it was thrown at the ground, without gravity.
+
+    model: MJCF with one body on a free joint, whose centre is `height` [m] above the ground when it touches that.
+    speed [m/s]: of the body, down. clearances [m]: where it starts, above that height, shape (drop,). steps: as long as
+    the model says. Positive is up; not-a-number of a body that is still in the ground. Shape (drop,).
+    """
+    compiled = mujoco.MjModel.from_xml_string(model)
+    compiled.opt.gravity[:] = 0.0
+    found = np.full(len(clearances), np.nan)
+    for k, clearance in enumerate(clearances):
+        data = mujoco.MjData(compiled)
+        data.warning.number[:] = 1  # else it prints one, and writes it to a file, when it is the first of its kind
+        data.qpos[2], data.qvel[2] = height + clearance, -speed
+        mujoco.mj_step(compiled, data, steps)
+        if data.qpos[2] > height:
+            found[k] = data.qvel[2]
+    return found

@@ -141,3 +141,32 @@ class Pybullet(RigidBody):
 
 
 _PLAIN = {"restitution": 0, "spinningFriction": 0, "rollingFriction": 0, "linearDamping": 0, "angularDamping": 0}
+
+
+def rebounds(restitution: float, side: float, mass: float, speed: float, h: float, clearances: Array) -> Array:
+    """Return the speeds [m/s] at which a box with Bullet's own restitution leaves the plane, without gravity.
+
+    restitution [1]: of the box, that of the plane being 1; Bullet multiplies them. speed [m/s]: of the box, down. side
+    [m], mass [kg]: of the box. h [s]: a time step. clearances [m]: where its lower face starts, shape (drop,). A box
+    that stays has 0.
+    """
+    found = np.zeros(len(clearances))
+    for k, clearance in enumerate(clearances):
+        here = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
+        # Below Bullet's own threshold, 0.5 m/s, nothing bounces.
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=h, restitutionVelocityThreshold=0, **here)
+        plane = pybullet.createMultiBody(0, pybullet.createCollisionShape(pybullet.GEOM_PLANE, **here), **here)
+        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[side / 2] * 3, **here)
+        box = pybullet.createMultiBody(mass, shape, basePosition=[0, 0, side / 2 + clearance], **here)
+        pybullet.changeDynamics(plane, -1, restitution=1, **here)
+        pybullet.changeDynamics(box, -1, restitution=restitution, linearDamping=0, angularDamping=0, **here)
+        pybullet.resetBaseVelocity(box, [0, 0, -speed], **here)
+        upward = 0.0
+        for _ in range(20 + int(side / speed / h)):
+            pybullet.stepSimulation(**here)
+            upward = pybullet.getBaseVelocity(box, **here)[0][2]
+            if upward > 0 and pybullet.getBasePositionAndOrientation(box, **here)[0][2] > side / 2 + clearance:
+                break
+        found[k] = max(0.0, upward)
+        pybullet.disconnect(**here)
+    return found

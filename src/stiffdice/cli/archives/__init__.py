@@ -1,0 +1,1 @@
+"""The commands about archives: pack, check, make again."""
