@@ -23,7 +23,7 @@ MATERIALS = {
         0.83,
         "± 0.06",
         "up to 1.5",
-        "Durda et al. 2011, doi:10.1016/j.icarus.2010.09.003",
+        "Durda et al. 2011, Icarus 211, 849",
     ),
     "table-tennis": Material(
         "table-tennis ball on a steel block",
