@@ -35,6 +35,7 @@ PAGES = [
     "docs/stability.md",
     "docs/tradeoff.md",
     "docs/engines.md",
+    "docs/engines-dart.md",
     "docs/engines-drake.md",
     "docs/engines-mujoco-pybullet.md",
     "docs/granular.md",

@@ -29,7 +29,7 @@ def add(run: argparse.ArgumentParser) -> None:
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
     told = "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling)"
     run.add_argument("--model", default="tumbling", metavar="M", help=told)
-    told = "stiffdice, or mujoco, pybullet, drake, scipy, octave, numpy where installed (default: stiffdice)"
+    told = "stiffdice, or mujoco, pybullet, drake, dart, scipy, octave, numpy where installed (default: stiffdice)"
     run.add_argument("--simulator", default="stiffdice", metavar="NAME", help=told)
     told = "symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
     run.add_argument("--scheme", metavar="NAME", help=told)
