@@ -19,7 +19,7 @@ help:  ## show this list
 install:  ## set up .venv from the lock files, unless it is what they say (the other targets do it, too; status only tells)
 	@PYTHON="$(PYTHON)" requirements/install
 
-install-engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, PyBullet; 0.5 GB)
+install-engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, DART, PyBullet; 0.5 GB)
 	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
 
 paper: install  ## rebuild everything the paper shows, into results/paper/

@@ -38,6 +38,7 @@ PAGES = [
     "docs/engines.md",
     "docs/pair.md",
     "docs/pair-engines.md",
+    "docs/engines-dart.md",
     "docs/engines-drake.md",
     "docs/engines-mujoco-pybullet.md",
     "docs/granular.md",

@@ -144,7 +144,7 @@ def test_limits_are_told_with_how_a_method_fails(limits):
     assert scipy[at_two] == "1 … 1"
     assert ours["leaves the ground"] == scipy["leaves the ground"] == "≥ 12"
     assert float(implicit["leaves the ground"]) < 12
-    assert "Left out or not installed: MuJoCo, PyBullet, Drake, GNU Octave." in told.markdown
+    assert "Left out or not installed: MuJoCo, PyBullet, Drake, DART, GNU Octave." in told.markdown
 
 
 def test_a_limit_is_the_last_before_the_first_failure():

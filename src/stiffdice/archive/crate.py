@@ -46,6 +46,7 @@ _FORMATS = {
 # Files of the project that are described one by one, besides the study's and README.md, which is about the whole.
 _FILES = ("CITATION.cff", "LICENSE", "CHANGELOG.md", "Makefile", "pyproject.toml", "results/README.md")
 _HOMEPAGES = {
+    "dartpy": "https://dartsim.github.io",
     "drake": "https://drake.mit.edu",
     "h5netcdf": "https://h5netcdf.org",
     "h5py": "https://www.h5py.org",

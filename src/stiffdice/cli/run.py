@@ -41,7 +41,7 @@ def add(run: argparse.ArgumentParser) -> None:
         "pair: two cubes, of a scene with `cubes` (default there)"
     )
     run.add_argument("--model", metavar="M", help=told)
-    told = "stiffdice, or mujoco, pybullet, drake, scipy, octave, numpy where installed (default: stiffdice)"
+    told = "stiffdice, or mujoco, pybullet, drake, dart, scipy, octave, numpy where installed (default: stiffdice)"
     run.add_argument("--simulator", default="stiffdice", metavar="NAME", help=told)
     told = "symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
     run.add_argument("--scheme", metavar="NAME", help=told)

@@ -173,7 +173,7 @@ def test_notes_tell_versions_and_what_is_missing(limits, speed):
     for name, data in {"engine-limits": limits, "engine-speed": speed}.items():
         told = texts(drawn(name, {"name": data}))
         assert f"numpy {np.__version__}" in told
-        assert "MuJoCo, PyBullet, Drake, GNU Octave" in told
+        assert "MuJoCo, PyBullet, Drake, DART, GNU Octave" in told
 
 
 def test_each_method_has_a_panel_with_the_limit_of_stability(limits):

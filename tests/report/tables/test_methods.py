@@ -132,5 +132,5 @@ def test_schemes_and_solvers_alone_need_no_word_on_engines():
 
 def test_a_solver_of_scipy_stands_for_scipy():
     note = engines_note([compared("mujoco", "scipy_dop853", versions="MuJoCo 4.0.0; SciPy 1.17.1")])
-    assert note.startswith("Engines: MuJoCo 4.0.0, SciPy 1.17.1. Left out or not installed: PyBullet, Drake,")
+    assert note.startswith("Engines: MuJoCo 4.0.0, SciPy 1.17.1. Left out or not installed: PyBullet, Drake, DART,")
     assert "SciPy LSODA" not in note

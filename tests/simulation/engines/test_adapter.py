@@ -10,7 +10,7 @@ from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.run import simulate
 
-pytestmark = [pytest.mark.long, pytest.mark.parametrize("name", ["mujoco", "pybullet"])]
+pytestmark = [pytest.mark.long, pytest.mark.parametrize("name", ["mujoco", "pybullet", "dart"])]
 
 TUMBLE = {"angular_momentum": [0.3, 0.5, 0.2], "orientation": [0.1, 0.2, 0.3], "node_velocity": "rigid"}
 

@@ -40,6 +40,7 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "mujoco": {"color": style.BLUE, "marker": "d"},
     "pybullet": {"color": style.ORANGE, "marker": "h"},
     "drake": {"color": style.PURPLE, "marker": "p"},
+    "dart": {"color": "#997700", "marker": "H"},
     "scipy": {"color": style.INK, "marker": ">"},
     "octave": {"color": style.GREEN, "marker": "X"},
     "numpy": {"color": style.VERMILION, "marker": "+"},

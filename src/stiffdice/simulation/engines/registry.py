@@ -60,6 +60,12 @@ def _drake() -> type[Engine]:
     return Drake
 
 
+def _dart() -> type[Engine]:
+    from stiffdice.simulation.engines.dart import Dart
+
+    return Dart
+
+
 def _octave() -> type[Engine]:
     from stiffdice.simulation.engines.octave import Octave
 
@@ -79,8 +85,9 @@ def _peer_of_scipy(solver: str, name: str) -> Peer:
 # What `simulator` may be besides stiffdice.
 ENGINES: dict[str, Peer] = {
     "mujoco": Peer(_mujoco, "MuJoCo", "the package mujoco"),
-    "pybullet": Peer(_pybullet, "PyBullet", "the package pybullet"),
+    "pybullet": Peer(_pybullet, "PyBullet", "the package pybullet"),  # unmaintained: last release in January 2025
     "drake": Peer(_drake, "Drake", "the package drake", dearness=300),
+    "dart": Peer(_dart, "DART", "the package dartpy", dearness=150),
     "scipy": _peer_of_scipy("lsoda", "LSODA"),
     "octave": Peer(_octave, "GNU Octave", "the program octave-cli", "your system's package manager", 3000),
     "numpy": Peer(lambda: NumpyLoop, "NumPy loop", "the package numpy", "make install", 500),
