@@ -104,7 +104,7 @@ CHANGES = {
         ('    "jobs": "benchmarks.jobs",\n', '    "jobs": "benchmarks.jobs",\n    "nothing": "benchmarks.nothing",\n')
     ],
     "cli/main.py": [
-        ("import advise, diff,", "import advise, diff, greet,"),
+        ("import advise, check, diff,", "import advise, check, diff, greet,"),
         ("in (run, advise,", "in (greet, run, advise,"),
     ],
     "scene/flat_landing.py": [

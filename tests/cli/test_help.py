@@ -20,6 +20,7 @@ COMMANDS = [
     "throw",
     "tosses",
     "infer",
+    "check",
     "inspect",
     "diff",
     "status",
