@@ -8,7 +8,7 @@ from tests.mjcf_files import LINEAR, ball, body, scene, written
 
 pytest.importorskip("mujoco")
 from stiffdice.advice.model_check import check
-from stiffdice.advice.model_patch import Change, change_for, patch
+from stiffdice.advice.model_patch import Change, advised, patch
 from stiffdice.simulation.engines.mjcf.model import load
 
 pytestmark = pytest.mark.long
@@ -27,7 +27,8 @@ def patched(text, folder, monkeypatch):
     path = written(text, folder).relative_to(folder)
     found = check(path)
     assert not found.passed
-    told = patch(found.model, change_for(found))
+    told, beyond = advised(found)
+    assert beyond == ()
     subprocess.run(["patch", "-p0"], input=told, text=True, check=True, capture_output=True)
     lines = [line for line in told.splitlines() if line[0] in "+-" and line[:3] not in ("+++", "---")]
     return lines, check(path).passed
@@ -43,6 +44,7 @@ def patched(text, folder, monkeypatch):
         (scene(body(BALL, SOFT + ' priority="1"'), LINEAR), 2),  # the floor's solref has no say
         (scene(body(BALL), more=PAIR), 2),
         (scene(TWO_ON_A_LINE, SOFT), 4),
+        (scene("\n".join(body('type="sphere" size="0.1"', SOFT, name) for name in "ab"), SOFT), 6),
     ],
 )
 def test_the_patch_applied_makes_the_model_pass(text, lines, tmp_path, monkeypatch):
@@ -56,6 +58,16 @@ def test_the_step_is_written_where_the_model_has_none(tmp_path, monkeypatch):
     changed, passed = patched(text, tmp_path, monkeypatch)
     assert passed
     assert changed == ['+  <option timestep="0.001"/>']
+
+
+def test_where_nothing_helps_all_it_helps_those_that_fall_straight(tmp_path):
+    """A rod on its end that carries a hinged weight turns, and its landing is another one with every solref."""
+    rod = body('type="capsule" size="0.02 0.3"', 'friction="2"', "rod", 'pos="3 0 1" euler="30 0 0"')
+    hinged = rod.replace("</body>", '<body pos="0 0 0.32"><joint axis="1 0 0"/><geom size="0.1"/></body></body>')
+    text = scene(body(BALL, SOFT) + hinged, SOFT, 'timestep="0.004"')
+    told, beyond = advised(check(written(text, tmp_path)))
+    assert [contact.meeting.names for contact in beyond] == [("rod", "floor"), ("it", "rod")]
+    assert told.count("solref") == 4
 
 
 def test_all_else_of_the_file_stays_as_it_is(tmp_path):

@@ -8,7 +8,7 @@ the way of a step. That is done at an eighth to eight times the model's time ste
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -65,7 +65,7 @@ class Contact:
     """What was found of one meeting.
 
     law: by which it was predicted, at the model's time step; speed [m/s]; spring [m]: the depth at which the law's ω
-    and ζ are given, the deepest of a landing; alike: other meetings of the same numbers.
+    and ζ are given, the deepest of a landing; alike: other meetings of the same numbers, which are not measured.
     """
 
     meeting: Meeting
@@ -74,7 +74,7 @@ class Contact:
     spring: float
     rungs: tuple[Rung, ...]
     verdicts: tuple[Verdict, ...]
-    alike: tuple[tuple[str, str], ...] = ()
+    alike: tuple[tuple[Meeting, Touch], ...] = ()
 
     @property
     def law(self) -> Law:
@@ -104,7 +104,7 @@ class Check:
     model: Model
     contacts: tuple[Contact, ...]
     missed: tuple[tuple[str, str], ...]
-    left: int
+    left: int = 0
 
     @property
     def passed(self) -> bool:
@@ -114,18 +114,31 @@ class Check:
 
 def check(path: Path, tell: Callable[[str], None] = lambda _: None) -> Check:
     """Return what a model's contacts do; raises InputError where it cannot be read, or nothing in it can fall."""
-    return check_model(load(path), LADDER, tell)
+    from stiffdice.simulation.engines.mjcf.meeting import meetings_of
+
+    model = load(path)
+    everyone = meetings_of(model.compiled)
+    if not everyone:
+        raise InputError(f"{path}: no free body that may touch a plane or another body: nothing to check")
+    found = check_meetings(model, everyone[:MOST], LADDER, tell)
+    return replace(found, left=len(everyone[MOST:]))
 
 
-def check_model(model: Model, ladder: tuple[float, ...], tell: Callable[[str], None] = lambda _: None) -> Check:
-    """Return what a model's contacts do at some time steps. ladder: of the model's own, one and others."""
+def check_meetings(
+    model: Model,
+    everyone: Sequence[Meeting],
+    ladder: tuple[float, ...],
+    tell: Callable[[str], None] = lambda _: None,
+    *,
+    stop: bool = False,
+) -> Check:
+    """Return what contacts of a model do. ladder: time steps in the model's own; stop: with the first verdict."""
     from stiffdice.simulation.engines.mjcf import meeting as meetings
 
     found: dict[object, Contact] = {}
     missed: list[tuple[str, str]] = []
     with silence():
-        everyone = meetings.meetings_of(model.compiled)
-        for meeting in everyone[:MOST]:
+        for meeting in everyone:
             tell(f"{meeting.names[0]} on {meeting.names[1]}")
             alone = meetings.alone(model.compiled, meeting)
             touch = meetings.touch_of(alone, meeting)
@@ -134,12 +147,12 @@ def check_model(model: Model, ladder: tuple[float, ...], tell: Callable[[str], N
                 continue
             key = _likeness(meeting, touch)
             if key in found:
-                found[key] = replace(found[key], alike=(*found[key].alike, meeting.names))
+                found[key] = replace(found[key], alike=(*found[key].alike, (meeting, touch)))
             else:
                 found[key] = _contact(alone, meeting, touch, ladder)
-    if not everyone:
-        raise InputError(f"{model.path}: no free body that may touch a plane or another body: nothing to check")
-    return Check(model, tuple(found.values()), tuple(missed), max(0, len(everyone) - MOST))
+                if stop and found[key].verdicts:
+                    break
+    return Check(model, tuple(found.values()), tuple(missed))
 
 
 def _likeness(meeting: Meeting, touch: Touch) -> object:

@@ -3,7 +3,8 @@
 Contacts that are soft or over-damped get a new `solref`. Tried are the model's time step and its half, quarter and
 eighth, then softer contacts where they are too stiff for the model's step, then still shorter steps, down to a 64th.
 Each is tried on the compiled model, and all landings are measured once more. What helps is then written into the XML,
-at the attributes that say it.
+at the attributes that say it. Where nothing helps all contacts, those that turn or
+move otherwise than straight down are left out.
 """
 
 from __future__ import annotations
@@ -14,15 +15,29 @@ import re
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import mujoco
 
-from stiffdice.advice.model_check import DAMPED, DEEP, LADDER, PHASES, SUNK, Check, Contact, check_model
+from stiffdice.advice.model_check import (
+    DAMPED,
+    DEEP,
+    GAIN,
+    LADDER,
+    PHASES,
+    SUNK,
+    Check,
+    Contact,
+    check_meetings,
+)
 from stiffdice.simulation.engines.mjcf.law import Law
+from stiffdice.simulation.engines.mjcf.meeting import Touch
 from stiffdice.simulation.engines.mjcf.model import Model, Tag
 
 # How often the time step is halved before and after softer contacts are tried, and their ωh.
 _CHEAP, _DEAR, _SOFT = 3, (4, 5, 6), 0.1
+# The ωh from which a still shorter step may keep a contact from gaining energy.
+_STIFF = 0.5
 # Depths that are aimed at, in those that are allowed; and how much stiffer is tried at a time.
 _AIM, _STIFFER = 0.8, 1.1
 
@@ -36,20 +51,59 @@ class Change:
     pairs: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
+class Advice(NamedTuple):
+    """A unified diff of a model's file, None if nothing helps or can be written; and contacts left out of it."""
+
+    patch: str | None
+    beyond: tuple[Contact, ...]
+
+
+def advised(check: Check, tell: Callable[[str], None] = lambda _: None) -> Advice:
+    """Return what makes all contacts of a model pass; else those of bodies that fall and rise straight."""
+    change = change_for(check, tell)
+    if change is not None:
+        return Advice(patch(check.model, change), ())
+    straight = tuple(contact for contact in check.contacts if contact.touch.is_straight)
+    others = tuple(contact for contact in check.contacts if not contact.touch.is_straight)
+    if others and any(contact.verdicts for contact in straight):
+        change = change_for(replace(check, contacts=straight), tell)
+    return Advice(None if change is None else patch(check.model, change), others)
+
+
 def change_for(check: Check, tell: Callable[[str], None] = lambda _: None) -> Change | None:
     """Return what makes all contacts of a model pass; None if nothing tried does."""
-    own = float(check.model.compiled.opt.timestep)
+    own, tried = float(check.model.compiled.opt.timestep), [Change()]
     for halves, softer in [*((k, False) for k in range(_CHEAP + 1)), (0, True), *((k, False) for k in _DEAR)]:
         timestep = own / 2**halves
         change = _change(check, timestep, softer)
         if halves:
             change = replace(change, timestep=timestep)
-        if change == Change():
+        if change in tried or _is_hopeless(check, change, halves):
             continue
-        tell(f"a time step of {timestep:g} s" + " and a softer contact" * softer)
-        if check_model(changed(check.model, change), (LADDER[0], 1.0)).passed:
+        tried.append(change)
+        tell(f"trying a time step of {timestep:g} s" + " and softer contacts" * softer)
+        if _passes(check, change):
             return change
     return None
+
+
+def _is_hopeless(check: Check, change: Change, halves: int) -> bool:
+    """Return whether the ladder has shown that a shorter time step does not help.
+
+    It does not where energy grows at that step already, and beyond the ladder where its shortest step was no long one.
+    """
+    if halves > _CHEAP:
+        return all(contact.rungs[0].omega_h < _STIFF for contact in check.contacts if contact.verdicts)
+    if change.geoms or change.pairs:
+        return False
+    return any(contact.rungs[_CHEAP - halves].energy > GAIN for contact in check.contacts)
+
+
+def _passes(check: Check, change: Change) -> bool:
+    """Return whether a changed model has no verdict against it; contacts that had one are tried first."""
+    contacts = sorted(check.contacts, key=lambda contact: not contact.verdicts)
+    everyone = [meeting for contact in contacts for meeting, _ in [(contact.meeting, contact.touch), *contact.alike]]
+    return check_meetings(changed(check.model, change), everyone, (LADDER[0], 1.0), stop=True).passed
 
 
 def _change(check: Check, timestep: float, softer: bool) -> Change:
@@ -63,13 +117,17 @@ def _change(check: Check, timestep: float, softer: bool) -> Change:
             solref = _scaled(contact.law.solref, min(1.0, _SOFT / contact.own.omega_h), 1.0)
         else:
             continue
-        for (one, other), pair in zip(contact.touch.geoms, contact.touch.pairs, strict=True):
-            if pair >= 0:
-                change.pairs[pair] = solref
-                continue
-            rank = compiled.geom_priority
-            change.geoms.update({geom: solref for geom in (one, other) if rank[geom] == max(rank[one], rank[other])})
+        for touch in (contact.touch, *(alike for _, alike in contact.alike)):
+            change.pairs.update({pair: solref for pair in touch.pairs if pair >= 0})
+            change.geoms.update(dict.fromkeys(_ruling(compiled, touch), solref))
     return change
+
+
+def _ruling(compiled: mujoco.MjModel, touch: Touch) -> list[int]:
+    """Return the geoms whose `solref` counts in a contact: both, but where one has the higher priority."""
+    rank = compiled.geom_priority
+    pairs = [geoms for geoms, pair in zip(touch.geoms, touch.pairs, strict=True) if pair < 0]
+    return [geom for geoms in pairs for geom in geoms if rank[geom] == max(rank[list(geoms)])]
 
 
 def new_solref(contact: Contact, law: Law) -> tuple[float, float]:

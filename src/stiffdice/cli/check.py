@@ -44,23 +44,22 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.cli.terminal.progress import notes
     from stiffdice.report import model_page
 
-    patch, tried = None, False
+    advice = None
     with notes("check:") as tell:
         found = model_check.check(options.model, tell)
         if not found.passed:
             from stiffdice.advice import model_patch
 
-            change, tried = model_patch.change_for(found, tell), True
-            patch = None if change is None else model_patch.patch(found.model, change)
+            advice = model_patch.advised(found, tell)
     if figure is not None:
         from stiffdice.report.figures import model_check as drawing
         from stiffdice.report.figures.registry import store
 
         store(partial(drawing.draw, found), {}, f"Landings of {found.model.path.name}", 150, [str(figure)])
     if options.patch:
-        print(patch or "", end="")
+        print((advice and advice.patch) or "", end="")
     else:
-        print(model_page.as_json(found, patch) if options.json else model_page.as_text(found, patch, tried))
+        print(model_page.as_json(found, advice) if options.json else model_page.as_text(found, advice))
     return 0 if found.passed else 1
 
 

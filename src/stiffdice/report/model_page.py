@@ -4,29 +4,31 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stiffdice.advice.model_check import Check, Contact, Rung, Span
 from stiffdice.errors import printable
 from stiffdice.report.markdown_table import aligned
 from stiffdice.report.number_format import finite
 
+if TYPE_CHECKING:
+    from stiffdice.advice.model_patch import Advice
 
-def as_text(check: Check, patch: str | None, tried: bool) -> str:
-    """Return a page: every contact, what is wrong with it, and what to change.
 
-    patch: a unified diff, None if there is none; tried: whether one was looked for.
-    """
+def as_text(check: Check, advice: Advice | None = None) -> str:
+    """Return a page: every contact, what is wrong with it, and what to change. advice: None where nothing is wrong."""
     blocks = [_head(check), *(_contact(contact) for contact in check.contacts)]
     if check.missed:
         blocks.append(["never touch: " + "; ".join(f"{one} on {other}" for one, other in check.missed)])
     if check.left:
         blocks.append([f"{check.left} more pairs of bodies are not measured"])
     lines = [printable(line) for block in blocks for line in [*block, ""]]
-    if patch:
-        lines += ["what to change, so that all of this passes (patch -p0):", "", patch.rstrip("\n")]
-    elif tried:
-        lines.append("what to change: nothing that was tried makes all of this pass")
+    if advice is not None and advice.patch:
+        but = ", ".join(" on ".join(contact.meeting.names) for contact in advice.beyond)
+        told = f"all but {but} passes" if but else "all of this passes"
+        lines += [f"what to change, so that {told} (patch -p0):", "", advice.patch.rstrip("\n")]
+    elif advice is not None:
+        lines.append("what to change: nothing that was tried makes all of this pass, and can be written into this file")
     return "\n".join(lines).rstrip("\n")
 
 
@@ -60,7 +62,7 @@ def _contact(contact: Contact) -> list[str]:
     rows += [("verdict", verdict.sentence) for verdict in contact.verdicts] or [("verdict", "fine")]
     one, other = contact.meeting.names
     head = f"{one} on {other}: {size:.3g} m, dropped from its size, {contact.speed:.3g} m/s"
-    alike = [f"  and alike: {'; '.join(f'{a} on {b}' for a, b in contact.alike)}"] if contact.alike else []
+    alike = [f"  and alike: {'; '.join(' on '.join(one.names) for one, _ in contact.alike)}"] if contact.alike else []
     headings = ("timestep", "ωh", "e predicted", "e measured", "energy", "depth")
     table = [headings, *(_cells(rung, contact) for rung in contact.rungs)]
     return [head, *alike, *(f"  {label:11}{text}" for label, text in rows), "", *aligned(table)]
@@ -85,7 +87,7 @@ def _parts(depth: float, size: float) -> str:
     return f"{depth:.2g} m ({depth / size:.2%})" if math.isfinite(depth) else "without end"
 
 
-def as_json(check: Check, patch: str | None) -> str:
+def as_json(check: Check, advice: Advice | None = None) -> str:
     """Return the same for programs: units in the keys, null for what has no number."""
     option = check.model.compiled.opt
     content = {
@@ -95,7 +97,8 @@ def as_json(check: Check, patch: str | None) -> str:
         "contacts": [_plain(contact) for contact in check.contacts],
         "never_touch": check.missed,
         "not_measured": check.left,
-        "patch": patch,
+        "patch": advice and advice.patch,
+        "not_patched": [contact.meeting.names for contact in advice.beyond] if advice else [],
     }
     return json.dumps(content, indent=2)
 
@@ -116,7 +119,7 @@ def _plain(contact: Contact) -> dict[str, Any]:
     }
     return {
         "bodies": contact.meeting.names,
-        "alike": contact.alike,
+        "alike": [meeting.names for meeting, _ in contact.alike],
         "with": "floor" if contact.meeting.is_floor else "body",
         "solref": law.solref,
         "solimp": law.solimp,

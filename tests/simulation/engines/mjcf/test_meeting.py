@@ -69,10 +69,12 @@ def test_what_makes_a_contact_nonlinear_is_said(tmp_path):
     assert why(ball()) == []
     assert why(ball(WIDE)) == ["solimp: impedance 0.3 to 0.9 over 0.005 m"]
     assert why(scene(body(BOX))) == ["4 contacts at once"]
+    two = scene(body(BOX, "", place='pos="0 0 1" euler="45 0 0"'), LINEAR.replace("-20", "-30"), 'cone="elliptic"')
+    assert why(two)[::2] == ["2 contacts at once", "elliptic cones: friction acts on the normal force"]
     tilted = scene(body('type="capsule" size="0.1 0.3"', place='pos="0 0 1" euler="30 0 0"'), option='cone="elliptic"')
     assert why(tilted) == [
-        "the contact is not below the centre of mass: the body turns",
-        "elliptic cone: friction acts on the normal force",
+        "elliptic cones: friction acts on the normal force",
+        "not below the centre of mass: the body turns",
     ]
     assert why(ball(option='density="1.2" integrator="RK4"')) == ["a medium: density or viscosity"]
 

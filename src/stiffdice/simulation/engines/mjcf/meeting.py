@@ -48,9 +48,9 @@ class Touch:
     """How a meeting begins: where, and by which law.
 
     pose: qpos at first contact, shape (nq,); row: how fast the contacts open by generalised velocity, on average, shape
-    (nv,); law: at the model's own time step; contacts: how many; why: what makes
-    the law nonlinear, or other than that of one contact; geoms: pairs of geoms in contact; pairs: <pair> elements, −1
-    where there is none.
+    (nv,); law: at the model's own time step; contacts: how many; why: what is not linear; is_straight: whether all of
+    that is in the law, as several contacts below the centre of mass are; geoms: pairs of geoms in contact; pairs:
+    <pair> elements, −1 where there is none.
     """
 
     pose: Vector
@@ -58,6 +58,7 @@ class Touch:
     law: Law
     contacts: int
     why: tuple[str, ...]
+    is_straight: bool
     geoms: tuple[tuple[int, int], ...]
     pairs: tuple[int, ...]
 
@@ -232,7 +233,8 @@ def _touch(model: mujoco.MjModel, data: mujoco.MjData, meeting: Meeting, pose: V
     rows = np.array([_row(model, data, contact, meeting) for contact in contacts])
     solved = np.empty_like(rows)
     mujoco.mj_solveM(model, data, solved, rows)
-    inverse = float((rows @ solved.T).sum() / len(rows))  # what n equal forces do at each contact, on average
+    sums = (rows @ solved.T).sum(1)  # what equal forces do at each contact
+    inverse = float(sums.mean())
     guess = float(sum(model.body_invweight0[model.geom_bodyid[geom], 0] for geom in first.geom)) * _pyramid(
         model, first
     )
@@ -248,8 +250,9 @@ def _touch(model: mujoco.MjModel, data: mujoco.MjData, meeting: Meeting, pose: V
         rk4=model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4,
     )
     geoms = tuple(dict.fromkeys((int(contact.geom[0]), int(contact.geom[1])) for contact in contacts))
-    why = _reasons(model, data, meeting, contacts, law, inverse)
-    return Touch(pose, rows.mean(0), law, len(contacts), tuple(why), geoms, tuple(_pair(model, pair) for pair in geoms))
+    within, beyond = _reasons(model, meeting, contacts, law, sums)
+    pairs = tuple(_pair(model, pair) for pair in geoms)
+    return Touch(pose, rows.mean(0), law, len(contacts), (*within, *beyond), not beyond, geoms, pairs)
 
 
 def _row(model: mujoco.MjModel, data: mujoco.MjData, contact: mujoco.MjContact, meeting: Meeting) -> Vector:
@@ -278,37 +281,33 @@ def _pair(model: mujoco.MjModel, geoms: tuple[int, int]) -> int:
 
 
 def _reasons(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    meeting: Meeting,
-    contacts: list[mujoco.MjContact],
-    law: Law,
-    inverse: float,
-) -> list[str]:
-    """Return what the law of one linear contact leaves out, in words."""
-    why = []
+    model: mujoco.MjModel, meeting: Meeting, contacts: list[mujoco.MjContact], law: Law, inverse: Vector
+) -> tuple[list[str], list[str]]:
+    """Return in words what is not linear but in the law, and what the law leaves out.
+
+    inverse [1/kg]: acceleration at each contact by a unit force at all, shape (n,).
+    """
+    within, beyond = [], []
     if len(contacts) > 1:
-        why.append(f"{len(contacts)} contacts at once")
+        within.append(f"{len(contacts)} contacts at once")
     if not law.is_constant:
         low, high, width, *_ = law.solimp
-        why.append(f"solimp: impedance {low:g} to {high:g} over {width:g} m")
-    straight = sum(1 / model.body_subtreemass[root] for root in meeting.trees)
-    off_centre = len(contacts) == 1 and abs(inverse / straight - 1) > _CENTRAL
-    if off_centre:
-        why.append("the contact is not below the centre of mass: the body turns")
-    if model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC and contacts[0].dim > 1 and (off_centre or len(contacts) > 1):
-        why.append("elliptic cone: friction acts on the normal force")
+        within.append(f"solimp: impedance {low:g} to {high:g} over {width:g} m")
+    straight = len(contacts) * sum(1 / model.body_subtreemass[root] for root in meeting.trees)
+    if np.any(np.abs(inverse / straight - 1) > _CENTRAL):
+        beyond.append("not below the centre of mass: the body turns")
     if any(abs(contact.frame[:3] @ meeting.up) < 1 - _CENTRAL for contact in contacts):
-        why.append("the contact's normal is not the direction of the fall")
-    why += _moving_parts(model, meeting)
-    return why + _options(model)
+        beyond.append("the contact's normal is not the direction of the fall")
+    if model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC and contacts[0].dim > 1 and (beyond or len(contacts) > 1):
+        within.append("elliptic cones: friction acts on the normal force")
+    return within, [*beyond, *_moving_parts(model, meeting), *_options(model)]
 
 
 def _moving_parts(model: mujoco.MjModel, meeting: Meeting) -> list[str]:
     """Return what moves with the bodies, in words."""
     joints = np.isin(model.body_rootid[model.jnt_bodyid], meeting.trees)
     own = int((joints & (model.jnt_type != _FREE)).sum())
-    why = [f"{own} joints move with it"] if own else []
+    why = [f"moving joints: {own}"] if own else []
     return why + (["ties to other bodies are left out"] if len(_ties(model, meeting)) else [])
 
 
