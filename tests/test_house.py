@@ -108,7 +108,7 @@ CHANGES = {
         ('    "jobs": "benchmarks.jobs",\n', '    "jobs": "benchmarks.jobs",\n    "nothing": "benchmarks.nothing",\n')
     ],
     "cli/main.py": [
-        ("import advise, diff, ground,", "import advise, diff, greet, ground,"),
+        ("import advise, check, diff, ground,", "import advise, check, diff, greet, ground,"),
         ("in (run, advise,", "in (greet, run, advise,"),
     ],
     "scene/flat_landing.py": [

@@ -21,6 +21,7 @@ COMMANDS = [
     "throw",
     "tosses",
     "infer",
+    "check",
     "inspect",
     "diff",
     "status",

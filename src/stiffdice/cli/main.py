@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import advise, diff, ground, infer, inspect, run, status, throw, tosses
+from stiffdice.cli import advise, check, diff, ground, infer, inspect, run, status, throw, tosses
 from stiffdice.cli.archives import archive, rebuild, verify
 from stiffdice.errors import StiffdiceError, printable
 from stiffdice.scene import validation
@@ -37,7 +37,7 @@ examples:
 # By name, in the order in which they are told.
 COMMANDS = {
     module.__name__.rpartition(".")[2]: module
-    for module in (run, advise, ground, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
+    for module in (run, advise, ground, check, throw, tosses, infer, inspect, diff, status, archive, verify, rebuild)
 }
 
 
