@@ -82,12 +82,12 @@ def squares(scene: PairScene, pair: Pairs) -> Array:
     return np.maximum(np.linalg.eigvalsh(found.T @ found), 0.0)  # round-off around the modes without a spring
 
 
-def compression(scene: PairScene, pair: Pairs, direction: Array) -> float:
-    """Return ω² [rad²/s²] of two boxes that move against each other along a unit vector, shape (3,), without turning.
+def translations(scene: PairScene, pair: Pairs, direction: Array) -> Array:
+    """Return ω² [rad²/s²] of two boxes that move along a unit vector, shape (3,), and do not turn: ascending, (2,).
 
-    It is that of the reduced mass on Σ w S (q·direction)²; a mode if the contacts' forces pass both centres of mass.
+    They are modes if the contacts' forces pass the centres of mass, or in pairs do. The larger of boxes that touch
+    nothing else is that of the reduced mass on Σ w S (q·direction)².
     """
-    a, b = (cube.mass for cube in scene.cubes)
-    along = np.zeros(12)
-    along[0:3], along[6:9] = np.sqrt(b / (a + b)) * direction, -np.sqrt(a / (a + b)) * direction
-    return float(np.sum((rows(scene, pair) @ along) ** 2))
+    found = rows(scene, pair)
+    along = np.column_stack([found[:, :3] @ direction, found[:, 6:9] @ direction])
+    return np.maximum(np.linalg.eigvalsh(along.T @ along), 0.0)
