@@ -76,7 +76,7 @@ def rows(scene: PairScene, pair: Pairs) -> Array:
 def squares(scene: PairScene, pair: Pairs) -> Array:
     """Return ω² [rad²/s²] of the modes of two boxes in a state, shape (1,), ascending, shape (12,); 0 without a spring.
 
-    The damping ratio of a mode is (D/S) ω/2, as dashpots stand beside the springs.
+    The damping ratio of a mode is (D/S) ω/2 where dashpots stand beside the springs, |q| = 1: not where edges cross.
     """
     found = rows(scene, pair)
     return np.maximum(np.linalg.eigvalsh(found.T @ found), 0.0)  # round-off around the modes without a spring
