@@ -9,6 +9,7 @@
 #   snakemake engines                     other engines beside stiffdice, as far as they are installed
 #   snakemake tosses                      real tosses of a cube, and the simulation beside them
 #   snakemake shapes                      which face of a box comes up, by shape and load
+#   snakemake pair                        two cubes that meet: steps they need, how they leave each other
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -84,6 +85,11 @@ rule engines:
 rule shapes:
     input:
         lambda wildcards: everything_of("shapes"),
+
+
+rule pair:
+    input:
+        lambda wildcards: everything_of("pair"),
 
 
 rule study:

@@ -53,6 +53,7 @@ PAGES = [
     "docs/scale.md",
     "docs/cost.md",
     "docs/refinement.md",
+    "docs/pair-limits.md",
     "docs/dice.md",
     "docs/dice-shapes.md",
     "docs/dice-rolls.md",

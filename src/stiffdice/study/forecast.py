@@ -39,6 +39,7 @@ _EXPERIMENT = {
     **{"bounce-map": 2.4, "apex-edge": 32.0, "held-contacts": 16.0, "rocking": 1.3, "energy-budget": 0.8},
     **{"failure-map": 1.0, "friction-chatter": 0.8, "precision-limits": 1.2},
     **{"model-ablation": 5.0, "work-precision": 33.0, "engine-contact": 2.0, "engine-limits": 2.6, "engine-throw": 6.5},
+    **{"pair-limits": 28.0, "pair-outcomes": 35.0, "pair-orders": 8.0},
     **{"granular-steps": 3.0, "granular-impacts": 0.1, "granular-beads": 0.2},
     **{"landing": 60.0, "coarse-steps": 300.0},
     **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},

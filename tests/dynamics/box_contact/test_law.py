@@ -105,3 +105,18 @@ def test_damping_does_not_pull():
     assert law.evaluate(physics, state)[1] == pytest.approx(0, abs=1e-12)
     state["b"]["velocity"] = 0
     assert law.evaluate(physics, state)[1][0, 1, 2] == pytest.approx(4e-3, rel=1e-9)
+
+
+def test_damping_is_bounded_where_an_edge_grazes_a_plane():
+    """There q is some 10⁷ long: a dashpot that acts on q·u, and along q, takes more speed in a step than there is."""
+    turn = Rotation.from_rotvec([0, 1e-7, 0])
+    forces = []
+    for damping in (0.0, 3.0):
+        two = scene([0, 0, 0], [0.99, 0.5, 0], stiffness=1e4, damping=damping)
+        states = np.repeat(pair_start_of(two), 2001)
+        states["b"]["position"][:, 2] = np.linspace(-6e-8, 6e-8, len(states))
+        states["b"]["node_offset"] = turn.apply(states["b"]["node_offset"][0])
+        states["b"]["velocity"] = -0.1, 0.2, 0.7
+        forces.append(law.evaluate(pair_physics_of(two), states)[1][:, 0, :3])
+    speed = np.linalg.norm([0.1, 0.2, 0.7])
+    assert np.linalg.norm(forces[1] - forces[0], axis=1).max() < 5 * 3.0 * speed

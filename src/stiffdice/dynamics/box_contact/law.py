@@ -1,8 +1,9 @@
 """What two boxes do to each other: at each contact of their overlap, the law by which the ground acts on a node.
 
 At a contact of share w and depth d, whose points part at a velocity u along the direction q of the overlap's slope,
-so that d' = −q·u, the force is w max(0, S d + D d') along q, and friction is −μ |q| times it along the slip,
-regularised as in `contact.py`. The law is gated: boxes that are apart feel nothing.
+so that d' = −q·u, the force is w max(0, S d + D d'/q²) along q, and friction is −μ |q| times it along the slip,
+regularised as in `contact.py`. So a dashpot acts on the velocity along q alone, however long q is, w D u along a unit
+vector: where an edge grazes a plane, w q² is without bound. The law is gated: boxes that are apart feel nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from stiffdice.dynamics.vector import Vector, assign, cross, dot, minus, norm, p
 
 FORMULA = (
     "boxes overlap, U = S/2 sum of w d^2 at the vertices of the overlap below the face where that is least; at each "
-    "f = w max(0, S d + D d'), friction -mu f |q| u_t/(|u_t| + 1e-6 r)"
+    "f = w max(0, S d + D d'/q^2) q, friction -mu f |q| u_t/(|u_t| + 1e-6 r)"
 )
 
 
@@ -75,10 +76,10 @@ def _at(physics: PairPhysics, contact: Any, frame: Frame, bodies: Any, loads: Lo
     """Add what one contact does; bodies: the one that feels it, and the one with the face."""
     place, direction = _in_space(frame, contact.place), _in_space(frame, contact.direction)
     parting = _parting(bodies[0], bodies[1], frame.centre, place)
-    rate, square = -dot(direction, parting), dot(direction, direction)
+    rate = -dot(direction, parting) / dot(direction, direction)
     spring = contact.share * physics.stiffness * contact.depth
     pressed = max(0.0, spring + contact.share * physics.damping * rate)
-    slip = plus_times(parting, rate / square, direction)
+    slip = plus_times(parting, rate, direction)
     grip = -physics.friction * pressed * norm(direction) / (norm(slip) + physics.cutoff)
     elastic = _with(loads.spring, place, times(spring, direction))
     couple = times(-0.5 * physics.stiffness * contact.depth * contact.depth, _in_space(frame, contact.couple))
