@@ -31,6 +31,7 @@ PAGES = [
     "docs/api.md",
     "docs/method.md",
     "docs/advice.md",
+    "docs/check.md",
     "docs/speed.md",
     "docs/stability.md",
     "docs/tradeoff.md",
