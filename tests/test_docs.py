@@ -32,6 +32,7 @@ PAGES = [
     "docs/method.md",
     "docs/advice.md",
     "docs/ground.md",
+    "docs/check.md",
     "docs/speed.md",
     "docs/stability.md",
     "docs/tradeoff.md",

@@ -67,12 +67,10 @@ def test_bodies_alike_are_measured_once(tmp_path):
     ]
 
 
-def test_what_falls_past_is_told(tmp_path):
-    """A model without contacts."""
+def test_a_model_whose_contacts_are_off_is_refused(tmp_path):
     text = ball().replace("</mujoco>", '<option><flag contact="disable"/></option></mujoco>')
-    found = check(written(text, tmp_path))
-    assert (found.contacts, found.missed) == ((), (("it", "floor"),))
-    assert "never touch: it on floor" in as_text(found)
+    with pytest.raises(InputError, match=r"no contact comes about where a body falls \(it on floor\)"):
+        check(written(text, tmp_path))
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,9 @@ def check(path: Path, tell: Callable[[str], None] = lambda _: None) -> Check:
     if not everyone:
         raise InputError(f"{path}: no free body that may touch a plane or another body: nothing to check")
     found = check_meetings(model, everyone[:MOST], LADDER, tell)
+    if not found.contacts:
+        told = "; ".join(" on ".join(names) for names in found.missed)
+        raise InputError(f"{path}: no contact comes about where a body falls ({told}): nothing to check")
     return replace(found, left=len(everyone[MOST:]))
 
 

@@ -125,6 +125,7 @@ def _plain(contact: Contact) -> dict[str, Any]:
         "solimp": law.solimp,
         "contacts": contact.touch.contacts,
         "not_linear": contact.touch.why,
+        "straight": contact.touch.is_straight,
         **{name: finite(value) for name, value in numbers.items()},
         "verdicts": [verdict._asdict() for verdict in contact.verdicts],
         "ladder": [_rung(rung) for rung in contact.rungs],

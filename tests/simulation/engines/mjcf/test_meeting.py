@@ -80,9 +80,20 @@ def test_what_makes_a_contact_nonlinear_is_said(tmp_path):
 
 
 def test_a_tie_to_another_body_is_left_out_and_said(tmp_path):
-    more = '<equality><connect body1="it" anchor="0 0 0"/></equality>'
-    ((_, touch),) = touches(scene(body(BOX), more=more), tmp_path)
-    assert "ties to other bodies are left out" in touch.why
+    sites = '<site name="here" pos="0 0 3"/>' + body(BOX).replace("<geom", '<site name="there"/><geom')
+    spring = '<tendon><spatial stiffness="1e4"><site site="here"/><site site="there"/></spatial></tendon>'
+    weld = '<equality><connect body1="it" anchor="0 0 0"/></equality>'
+    for more in (spring, weld):
+        ((_, touch),) = touches(scene(sites, more=more), tmp_path)
+        assert "ties to other bodies are left out" in touch.why
+        assert touch.law.pull == pytest.approx(9.81)
+
+
+def test_joints_start_within_their_limits(tmp_path):
+    leg = '<body><joint axis="0 1 0" range="30 60"/><geom type="capsule" size="0.02" fromto="0 0 0 0.5 0 0"/></body>'
+    text = scene(body(BOX).replace("</body>", f"{leg}</body>"))
+    ((_, touch),) = touches(text, tmp_path)
+    assert np.degrees(touch.pose[7]) == pytest.approx(30.0)
 
 
 def test_the_inverse_mass_of_a_contact_off_centre_has_the_lever_in_it(tmp_path):

@@ -153,23 +153,37 @@ def alone(model: mujoco.MjModel, meeting: Meeting) -> mujoco.MjModel:
     disable = mujoco.mjtDisableBit
     model.opt.disableflags |= int(disable.mjDSBL_ACTUATION) | int(disable.mjDSBL_AUTORESET)
     model.eq_active0[_ties(model, meeting)] = 0
+    strings = _strings(model, meeting)
+    model.tendon_stiffness[strings], model.tendon_damping[strings], model.tendon_limited[strings] = 0, 0, 0
     return model
 
 
-def _ties(model: mujoco.MjModel, meeting: Meeting) -> npt.NDArray[np.intp]:
+def _ties(model: mujoco.MjModel, meeting: Meeting) -> list[int]:
     """Return the equality constraints that tie bodies of a meeting to other ones, or to the world."""
-    kind, object_type = mujoco.mjtEq, mujoco.mjtObj
-    found = []
+    kind, of_bodies = mujoco.mjtEq, []
     for k in range(model.neq):
-        ends = [int(model.eq_obj1id[k]), int(model.eq_obj2id[k])]
-        if model.eq_type[k] not in (int(kind.mjEQ_CONNECT), int(kind.mjEQ_WELD)):
-            continue
-        if model.eq_objtype[k] == int(object_type.mjOBJ_SITE):
-            ends = [int(model.site_bodyid[site]) for site in ends]
-        roots = {int(model.body_rootid[body]) for body in ends}
-        if len(roots) > 1 and roots & set(meeting.trees):
+        if model.eq_type[k] in (int(kind.mjEQ_CONNECT), int(kind.mjEQ_WELD)):
+            ends = [int(model.eq_obj1id[k]), int(model.eq_obj2id[k])]
+            if model.eq_objtype[k] == int(mujoco.mjtObj.mjOBJ_SITE):
+                ends = [int(model.site_bodyid[site]) for site in ends]
+            of_bodies.append((k, ends))
+    return [k for k, ends in of_bodies if _leads_out(model, meeting, ends)]
+
+
+def _strings(model: mujoco.MjModel, meeting: Meeting) -> list[int]:
+    """Return the spatial tendons that run from bodies of a meeting to other ones, or to the world."""
+    found = []
+    for k, (first, count) in enumerate(zip(model.tendon_adr, model.tendon_num, strict=True)):
+        on_sites = model.wrap_type[first : first + count] == int(mujoco.mjtWrap.mjWRAP_SITE)
+        sites = model.wrap_objid[first : first + count][on_sites]
+        if _leads_out(model, meeting, [int(body) for body in model.site_bodyid[sites]]):
             found.append(k)
-    return np.array(found, np.intp)
+    return found
+
+
+def _leads_out(model: mujoco.MjModel, meeting: Meeting, bodies: list[int]) -> bool:
+    roots = {int(model.body_rootid[body]) for body in bodies}
+    return bool(roots & set(meeting.trees)) and len(roots) > 1
 
 
 def active(data: mujoco.MjData, meeting: Meeting) -> npt.NDArray[np.intp]:
@@ -194,10 +208,11 @@ def raised(model: mujoco.MjModel, meeting: Meeting, pose: Vector, by: float) -> 
 def touch_of(model: mujoco.MjModel, meeting: Meeting) -> Touch | None:
     """Return how a meeting begins, of a model that is `alone`; None if the body falls past."""
     data = mujoco.MjData(model)
+    data.qpos = _within_limits(model)
     mujoco.mj_kinematics(model, data)
     start, target = data.geom_xpos[meeting.geoms[0]], data.geom_xpos[meeting.other_geoms[0]]
     aside = np.zeros(3) if meeting.is_floor else target - start
-    pose = np.array(data.qpos)
+    pose = _within_limits(model)
     place = model.jnt_qposadr[model.body_jntadr[meeting.body]]
     pose[place : place + 3] += aside - (aside @ meeting.up) * meeting.up
     low = float((target - start) @ meeting.up)  # its first geom is in the other's middle
@@ -213,6 +228,16 @@ def touch_of(model: mujoco.MjModel, meeting: Meeting) -> Touch | None:
     data.qpos = raised(model, meeting, touching, -_DEPTH * meeting.size)
     mujoco.mj_forward(model, data)
     return _touch(model, data, meeting, touching)
+
+
+def _within_limits(model: mujoco.MjModel) -> Vector:
+    """Return the model's pose with its joints in their ranges: limits that are broken would drive them apart."""
+    pose = np.array(model.qpos0)
+    hinged = np.isin(model.jnt_type, [int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)])
+    joints = np.flatnonzero(hinged & (model.jnt_limited != 0))
+    places = model.jnt_qposadr[joints]
+    pose[places] = np.clip(pose[places], *model.jnt_range[joints].T)
+    return pose
 
 
 def _touches(model: mujoco.MjModel, data: mujoco.MjData, meeting: Meeting, pose: Vector) -> bool:
@@ -300,6 +325,8 @@ def _reasons(
         beyond.append("the contact's normal is not the direction of the fall")
     if model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC and contacts[0].dim > 1 and (beyond or len(contacts) > 1):
         within.append("elliptic cones: friction acts on the normal force")
+    if _ties(model, meeting) + _strings(model, meeting):
+        within.append("ties to other bodies are left out")
     return within, [*beyond, *_moving_parts(model, meeting), *_options(model)]
 
 
@@ -307,8 +334,7 @@ def _moving_parts(model: mujoco.MjModel, meeting: Meeting) -> list[str]:
     """Return what moves with the bodies, in words."""
     joints = np.isin(model.body_rootid[model.jnt_bodyid], meeting.trees)
     own = int((joints & (model.jnt_type != _FREE)).sum())
-    why = [f"moving joints: {own}"] if own else []
-    return why + (["ties to other bodies are left out"] if len(_ties(model, meeting)) else [])
+    return [f"moving joints: {own}"] if own else []
 
 
 def _options(model: mujoco.MjModel) -> list[str]:
