@@ -52,7 +52,7 @@ def call(options: argparse.Namespace) -> int:
 
             advice = model_patch.advised(found, tell)
     if figure is not None:
-        from stiffdice.report.figures import model_check as drawing
+        from stiffdice.report.figures.contacts import model_check as drawing
         from stiffdice.report.figures.registry import store
 
         store(partial(drawing.draw, found), {}, f"Landings of {found.model.path.name}", 150, [str(figure)])

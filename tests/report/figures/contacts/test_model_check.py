@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from stiffdice.advice.model_check import LADDER, Check, Contact, Rung, Span, Verdict
-from stiffdice.report.figures import model_check, style
+from stiffdice.report.figures import style
+from stiffdice.report.figures.contacts import model_check
 from stiffdice.simulation.engines.mjcf.model import Model
 
 

@@ -1,0 +1,1 @@
+"""Figures of the contacts in models that other people wrote."""
