@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,13 @@ def test_what_cannot_be_checked_is_one_line_and_status_2(text, words, capsys, tm
     status, out, err = called(capsys, written(text, tmp_path))
     assert (status, out) == (2, "")
     assert err == [f"stiffdice: {tmp_path}/model.xml: {words}"]
+
+
+def test_without_mujoco_it_is_one_line_and_status_2(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    status, out, err = called(capsys, MODEL)
+    assert (status, out) == (2, "")
+    assert err == [f"stiffdice: {MODEL}: needs the package mujoco, which is not installed; make install-engines"]
 
 
 def test_a_missing_mesh_is_one_line_and_status_2(capsys, tmp_path):

@@ -114,9 +114,10 @@ class Check:
 
 def check(path: Path, tell: Callable[[str], None] = lambda _: None) -> Check:
     """Return what a model's contacts do; raises InputError where it cannot be read, or nothing in it can fall."""
+    model = load(path)
+    # It imports MuJoCo, which `load` has found.
     from stiffdice.simulation.engines.mjcf.meeting import meetings_of
 
-    model = load(path)
     everyone = meetings_of(model.compiled)
     if not everyone:
         raise InputError(f"{path}: no free body that may touch a plane or another body: nothing to check")

@@ -109,7 +109,8 @@ def test_scipy_is_imported_by_its_peers_only_and_these_by_whom_they_are_asked_fo
     """Numba may look for SciPy on its own."""
     asking = re.compile(r"^\s*(import|from) scipy", re.MULTILINE)
     named = {path.name for path in PACKAGE.rglob("*.py") if asking.search(path.read_text())}
-    assert named == {"scipy_ivp.py", "launches.py", "replay.py"}  # the last two: rotations of measured tosses
+    # The last: a reference of meetings of two cubes; the two before it: rotations of measured tosses.
+    assert named == {"scipy_ivp.py", "launches.py", "replay.py", "reference.py"}
     code = (
         "import sys, stiffdice.experiments.work_precision.measure, stiffdice.report.tables.methods; "
         "sys.exit('stiffdice.simulation.engines.scipy_ivp' in sys.modules)"
