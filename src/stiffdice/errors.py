@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Self
 
 LONGEST = 1000  # signs of a message
@@ -41,3 +43,12 @@ class RefusedError(InputError):
 
 class OutputError(StiffdiceError):
     """A result that could not be stored; nothing is left under its final name."""
+
+
+@contextmanager
+def told_within(source: str) -> Iterator[None]:
+    """Let an InputError be told with where it was found."""
+    try:
+        yield
+    except InputError as error:
+        raise error.within(source) from None

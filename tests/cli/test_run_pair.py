@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -236,3 +237,16 @@ def test_a_run_of_one_cube_is_drawn_too_if_it_turns(stiffdice):
     status, _, err, _ = stiffdice("run", scene, "--model", "sliding", "--animate", "one.gif", "-o", "out.h5")
     assert status == 2
     assert "allowed" in err
+
+
+@pytest.mark.parametrize("scene", [TWO, str(SCENES / "figure-09.yaml")])
+def test_a_scene_may_come_through_a_pipe(scene, stiffdice):
+    """It can be read once only."""
+    reading, writing = os.pipe()
+    os.write(writing, Path(scene).read_bytes())
+    os.close(writing)
+    status, _, err, files = stiffdice(
+        "run", f"/dev/fd/{reading}", "--steps", 1000, "--set", "duration=0.01", "-o", "out.h5"
+    )
+    os.close(reading)
+    assert (status, files) == (0, ["out.h5"]), err

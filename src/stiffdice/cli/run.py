@@ -6,10 +6,10 @@ import argparse
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from stiffdice.cli import common
-from stiffdice.errors import InputError, printable
+from stiffdice.errors import InputError, printable, told_within
 
 if TYPE_CHECKING:
     from stiffdice.io.plain_dataset import PlainDataset
@@ -70,18 +70,18 @@ def call(options: argparse.Namespace) -> None:
 
     if options.animate is not None and not options.animate.endswith(".gif"):
         raise InputError(f"--animate = {options.animate}: allowed is a name that ends with .gif")
-    if pair.is_pair(yaml_loader.load(options.scene)):
-        _run_pair(options)
-    else:
-        _run_one(options)
+    data = yaml_loader.load(options.scene)  # once: it may be a pipe
+    run = _run_pair if pair.is_pair(data) else _run_one
+    run(options, data)
 
 
-def _run_one(options: argparse.Namespace) -> None:
+def _run_one(options: argparse.Namespace, data: Any) -> None:
     """Run a scene of one cube."""
     from stiffdice.scene import scene as scenes
     from stiffdice.scene import validation
 
-    scene = scenes.load(options.scene, options.overrides, options.preset)
+    with told_within(options.scene):
+        scene = scenes.changed(data, options.overrides, options.preset)
     steps, note = _steps_of(options, scene.duration)
     target, drawing = _targets_of(options)
 
@@ -142,7 +142,7 @@ _OF_ONE = {
 }
 
 
-def _run_pair(options: argparse.Namespace) -> None:
+def _run_pair(options: argparse.Namespace, data: Any) -> None:
     """Run a scene of two cubes."""
     from stiffdice.scene import pair, validation
 
@@ -154,7 +154,8 @@ def _run_pair(options: argparse.Namespace) -> None:
     if options.simulator != "stiffdice":
         told = "allowed is stiffdice for two cubes; `make engines` compares engines, by one cube"
         raise InputError(f"--simulator = {options.simulator}: {told}")
-    scene = pair.load(options.scene, options.overrides)
+    with told_within(options.scene):
+        scene = pair.changed(data, options.overrides)
     steps, note = _steps_of(options, scene.duration)
     target, drawing = _targets_of(options)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from stiffdice.errors import InputError
+from stiffdice.errors import InputError, told_within
 from stiffdice.io import yaml_loader
 from stiffdice.scene import scene as scenes
 from stiffdice.scene import validation
@@ -150,10 +150,8 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> PairScene:
     Raises InputError naming the file, the key, the value and what is allowed.
     """
     data = yaml_loader.load(path)
-    try:
+    with told_within(str(path)):
         return changed(data, overrides)
-    except InputError as error:
-        raise error.within(str(path)) from None
 
 
 def changed(mapping: object, overrides: Sequence[str] = ()) -> PairScene:

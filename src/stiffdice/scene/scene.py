@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffdice.errors import InputError
+from stiffdice.errors import InputError, told_within
 from stiffdice.io import yaml_loader
 from stiffdice.scene import derived_parameters, validation
 from stiffdice.scene.cube import Cube
@@ -237,10 +237,8 @@ def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = N
     Raises InputError naming the file, the key, the value and what is allowed.
     """
     data = yaml_loader.load(path)
-    try:
+    with told_within(str(path)):
         return changed(data, overrides, preset)
-    except InputError as error:
-        raise error.within(str(path)) from None
 
 
 def changed(mapping: object, overrides: Sequence[str] = (), preset: str | None = None) -> Scene:
