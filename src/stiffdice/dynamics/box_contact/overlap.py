@@ -35,7 +35,7 @@ from stiffdice.dynamics.compilation import njit
 from stiffdice.dynamics.inertia import centre_of, half_edge
 from stiffdice.dynamics.state import Array
 from stiffdice.dynamics.vector import Vector, assign, cross, dot, minus, plus, plus_times, row, times, unit, vector
-from stiffdice.scene.cube import SIGNS
+from stiffdice.scene.cube import LINKS, SIGNS
 
 # A vertex of the intersection. In the frame of the box whose face it is below: place [m], direction: −∂depth/∂place of
 # X, couple [1/rad]: the slope of its share with a turn of X. depth [m]. share [1]: w.
@@ -60,9 +60,8 @@ MARGIN = 1e-12
 
 def _edges() -> npt.NDArray[np.int64]:
     """Return the twelve edges of a box, shape (12, 3): axis, node at its negative end, node at its positive end."""
-    nodes = [tuple(signs) for signs in SIGNS]
-    ends = [(axis, near, nodes.index((*near[:axis], 1.0, *near[axis + 1 :]))) for axis in range(3) for near in nodes]
-    return np.array([(axis, nodes.index(near), far) for axis, near, far in ends if near[axis] < 0])
+    ends = (sorted(link, key=lambda node: SIGNS[node].sum()) for link in LINKS)
+    return np.array(sorted((int(np.argmax(SIGNS[near] != SIGNS[far])), near, far) for near, far in ends))
 
 
 EDGES = _edges()

@@ -6,9 +6,6 @@ area A it pushes with 2 E A d/s, but less near the sides. E = 2 S/s makes that 4
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +34,7 @@ from pydrake.systems.framework import DiagramBuilder
 from stiffdice.experiments.pair.motion import Motion, pose_of
 from stiffdice.scene.cube import SIGNS, Cube
 from stiffdice.scene.pair import PairScene
+from stiffdice.simulation.engines.drake import silence
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Drake:
 
     def ended(self, scene: PairScene, h: float) -> Motion:
         """Return how the boxes move at the end of a scene without ground, in steps of h [s]; NaN where it failed."""
-        with _silence():
+        with silence():
             diagram, plant, bodies = self._built(scene, h)
             simulator = Simulator(diagram)
             context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
@@ -67,7 +65,7 @@ class Drake:
 
     def depth(self, scene: PairScene) -> float:
         """Return how deep one box is in the other [m]; 0 where they are found apart."""
-        with _silence():
+        with silence():
             diagram, plant, _ = self._built(scene, 1e-3)
             context = plant.GetMyContextFromRoot(diagram.CreateDefaultContext())
             query = plant.get_geometry_query_input_port().Eval(context)
@@ -111,14 +109,3 @@ class Drake:
 def _inertia(cube: Cube) -> SpatialInertia:
     gyration = cube.moment_of_inertia / cube.mass
     return SpatialInertia(cube.mass, np.zeros(3), UnitInertia(gyration, gyration, gyration))
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Let Drake log nothing: it warns of failures that are results here."""
-    logger = logging.getLogger("drake")
-    logger.disabled = True
-    try:
-        yield
-    finally:
-        logger.disabled = False

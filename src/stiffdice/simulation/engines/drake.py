@@ -66,7 +66,7 @@ class Drake(RigidBody):
         self._steps, self._failed = 0, False
         # Where a row's numbers are among Drake's.
         self._order = [4, 5, 6, 0, 1, 2, 3, 10, 11, 12, 7, 8, 9] if self.turns else slice(None)
-        with _silence():
+        with silence():
             builder = DiagramBuilder()
             self._plant, _ = AddMultibodyPlantSceneGraph(builder, self.h)
             _build(self._plant, self)
@@ -80,7 +80,7 @@ class Drake(RigidBody):
         # An evaluation a step: each looks for contacts once. What failed once has failed for good.
         self._steps += every
         try:  # up to half a step past the last one: round-off in the time can neither lose a step nor gain one
-            with _silence():
+            with silence():
                 if not self._failed:
                     self._simulator.AdvanceTo((self._steps - 0.5) * self.h)
         except (RuntimeError, SystemExit):  # the latter is what a failed assertion of Drake's raises
@@ -96,7 +96,7 @@ class Drake(RigidBody):
 
 
 @contextmanager
-def _silence() -> Iterator[None]:
+def silence() -> Iterator[None]:
     """Let Drake log nothing: it warns of what half spaces cannot do, and of failures that are results here."""
     logger = logging.getLogger("drake")
     logger.disabled = True
