@@ -12,27 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from stiffdice.cli import main as cli
-
 ROOT = Path(__file__).parents[2]
 SCENE = str(ROOT / "config" / "scenes" / "figure-09.yaml")
-
-
-@pytest.fixture
-def stiffdice(tmp_path, monkeypatch, capsys):
-    """Run the command in an empty folder; return its status, what it printed, and the files it left."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        try:
-            status = cli.main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            status = end.code
-        out, err = capsys.readouterr()
-        err = re.sub(r"^compiling .*\n", "", err, flags=re.MULTILINE)  # the first time
-        return status, out, err, sorted(path.name for path in tmp_path.iterdir())
-
-    return call
 
 
 def test_run_stores_a_file_and_says_its_verdict(stiffdice):

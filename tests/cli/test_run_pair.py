@@ -13,7 +13,6 @@ import xarray as xr
 from PIL import Image
 
 import stiffdice as public
-from stiffdice.cli import main as cli
 from stiffdice.dynamics.box_contact import law
 from stiffdice.io import schema
 from stiffdice.scene import pair
@@ -22,23 +21,6 @@ from stiffdice.simulation.pair.run import simulate_pair
 SCENES = Path(__file__).parents[2] / "config" / "scenes"
 TWO, STACK = str(SCENES / "two-cubes.yaml"), str(SCENES / "stacked-cubes.yaml")
 SHORT = ["--set", "duration=0.255", "--steps", "1020", "-o", "out.h5"]  # they meet after 0.23 s, in the air
-
-
-@pytest.fixture
-def stiffdice(tmp_path, monkeypatch, capsys):
-    """Run the command in an empty folder; return its status, what it printed, and the files it left."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        try:
-            status = cli.main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            status = end.code
-        out, err = capsys.readouterr()
-        err = re.sub(r"^compiling .*\n", "", err, flags=re.MULTILINE)  # the first time
-        return status, out, err, sorted(path.name for path in tmp_path.iterdir())
-
-    return call
 
 
 def test_a_run_is_stored_whole_and_told(stiffdice):
