@@ -105,7 +105,7 @@ docs: install  ## write docs/api.md from the docstrings of the public names, the
 	@$(BIN)/python docs/make_api.py && $(BIN)/python docs/make_format.py
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
-	@for name in build requirements engines; do \
+	@for name in build requirements engines docs; do \
 	  uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --fork-strategy fewest \
 	    --no-emit-index-url --custom-compile-command "make lock" \
 	    requirements/$$name.in -o requirements/$$name.lock; done
