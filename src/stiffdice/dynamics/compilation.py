@@ -22,7 +22,7 @@ class Compiled:
     @cached_property
     def dispatcher(self) -> Any:
         """What numba has for the function."""
-        from stiffdice.dynamics import compiler
+        from stiffdice.dynamics.compiling import compiler
 
         return compiler.dispatcher_of(self.py_func, self._bodies, self._options)
 
@@ -48,14 +48,14 @@ class Intrinsic:
 
     @property
     def _numba_type_(self) -> Any:
-        from stiffdice.dynamics import compiler
+        from stiffdice.dynamics.compiling import compiler
 
         return compiler.type_of(getattr(self._module(), self._name))
 
 
 def compile_together(*calls: tuple[Compiled, tuple[Any, ...]]) -> None:
     """Compile kernels for what they are about to be called with, the heaviest first, in two processes if that helps."""
-    from stiffdice.dynamics import parallel_compilation
+    from stiffdice.dynamics.compiling import parallel_compilation
 
     parallel_compilation.compile_together([(kernel.dispatcher, arguments) for kernel, arguments in calls])
 
@@ -70,6 +70,16 @@ def njit(function: Any = None, **options: Any) -> Any:
     if function is None:
         return partial(njit, **options)
     return Compiled(function, None, options)
+
+
+def separate(returns: str) -> Any:
+    """Compile a function as a kernel of its own, which other kernels call by its address; numba's would hold a copy.
+
+    So it is compiled beside what calls it, and once for all that do. It is never put into its caller: that is for what
+    works for longer than a call takes, some nanoseconds. returns: numba's type of what it returns, by which its callers
+    are compiled.
+    """
+    return njit(cache=True, returns=returns)
 
 
 def constant(value: Any) -> Any:

@@ -66,14 +66,22 @@ def energies(physics: Physics, states: States) -> tuple[Array, Array, Array]:
     return moving, high, pressed
 
 
-@njit(cache=True)
-def mechanical(model: Any, physics: Physics, states: States, lag_time: float) -> Array:
-    """Return kinetic + m g z + the springs' energy [J] of each state at the time of its place, shape (state,).
+def energies_at_places(model: Any, physics: Physics, states: States, lag_time: float) -> tuple[Array, ...]:
+    """Return kinetic, potential, elastic and mechanical energy [J] of each state, shape (state,) each.
 
-    lag_time [s]: how much earlier than the place the velocities are.
+    The mechanical one is the sum of all three at the time of the state's place. lag_time [s]: how much earlier than
+    that the velocities are.
     """
-    result = np.empty(states.shape[0])
-    for k in range(states.shape[0]):
-        moving = kinetic_at_place(model, physics, states[k], lag_time)
-        result[k] = moving + potential(physics, states[k]) + elastic(physics, states[k])
-    return result
+    parts = np.empty((4, len(states)))  # made here, as numba compiles all of `np.empty` where that is called
+    fill_energies(model, physics, states, lag_time, parts)
+    return tuple(parts)
+
+
+@njit(cache=True)
+def fill_energies(model: Any, physics: Physics, states: States, lag_time: float, parts: Array) -> None:
+    """Set `parts`, shape (4, state), to what `energies_at_places` returns."""
+    for k in range(len(states)):
+        state = states[k]
+        high, pressed = potential(physics, state), elastic(physics, state)
+        parts[0, k], parts[1, k], parts[2, k] = kinetic(physics, state), high, pressed
+        parts[3, k] = kinetic_at_place(model, physics, state, lag_time) + high + pressed

@@ -319,7 +319,12 @@ def _throws(common: _Common, launches: States) -> _Throws:
     count, late = len(launches), common.lag * common.k.h
     steps, face, rest = np.zeros(count, np.int64), np.zeros(count, np.int8), np.full(count, _OPEN, np.int8)
     return _Throws(
-        launches.copy(), steps, face, rest, np.zeros(count), energy.mechanical(*common.system, launches, late)
+        launches.copy(),
+        steps,
+        face,
+        rest,
+        np.zeros(count),
+        energy.energies_at_places(*common.system, launches, late)[3],
     )
 
 

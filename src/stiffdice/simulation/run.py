@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics import model_selection
-from stiffdice.dynamics.compilation import compile_together, njit
-from stiffdice.dynamics.energy import energies, mechanical
+from stiffdice.dynamics.compilation import compile_together, njit, separate
+from stiffdice.dynamics.energy import energies, energies_at_places, fill_energies
 from stiffdice.dynamics.state import Array, Ensemble, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
@@ -189,11 +189,13 @@ def _task(
 def _compile(task: Task, leaping: bool) -> None:
     """Compile all that the run will call."""
     system, members = task.system, task.members
-    march = batch_loop.march_of(task) if leaping else None
+    batched = batch_loop.march_of(task) if leaping else None
+    member = Member(members.ensemble[0], members.sight[0], members.memory[0], members.references[0])
+    march = [batched] if batched else [(_observed, (system, member, 0, 0)), (_march, _arguments(task, leaping))]
     watch = (criteria_start, (system, members)), (finish, (system.physics, members))
     states = members.samples
-    keep = (mechanical, (*system, states, 0.0)), (energies, (system.physics, states))
-    compile_together(march or (_march, _arguments(task, leaping)), *watch, *(keep if task.limits.every else ()))
+    keep = fill_energies, (*system, states, 0.0, np.empty((4, 0)))
+    compile_together(*march, *watch, *([keep] if task.limits.every else ()))
 
 
 def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:
@@ -251,9 +253,12 @@ def _trajectory(task: Task) -> Trajectory:
     setup, system, every = task.setup, task.system, task.limits.every
     state = task.members.samples[: int(task.members.steps_done[0]) // every + 1]
     step = np.arange(len(state), dtype=np.int64) * every
-    whole = mechanical(*system, state, setup.lag * setup.step_size) if setup.ours else None
     time = step / setup.steps * setup.scene.duration
-    kinetic, potential, elastic = energies(system.physics, state)
+    whole: Array | None
+    if setup.ours:
+        kinetic, potential, elastic, whole = energies_at_places(*system, state, setup.lag * setup.step_size)
+    else:
+        (kinetic, potential, elastic), whole = energies(system.physics, state), None
     return Trajectory(step, time, state, kinetic, potential, elastic, whole)
 
 
@@ -290,7 +295,7 @@ def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: 
                 continue
             if taken == 0:
                 break
-            undecided -= observe(system, member, done + taken, flown)
+            undecided -= _observed(system, member, done + taken, flown)
             if memory.finite[0] > 0.0:
                 done = done + taken - 1 if computed > 0 else done
                 break
@@ -300,6 +305,11 @@ def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: 
                 kept = until_kept(limits, done)
         members.steps_done[m] = done
     return False
+
+
+@separate("int64")
+def _observed(system: System, member: Member, step: int, flown: int) -> int:
+    return observe(system, member, step, flown)
 
 
 @njit

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stiffdice.dynamics.kernel_cache import cache_folder
+from stiffdice.dynamics.compiling.kernel_cache import cache_folder
 from stiffdice.study import outputs
 from stiffdice.study.catalogue import DRAWINGS
 from stiffdice.study.config import Study

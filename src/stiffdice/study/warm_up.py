@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from stiffdice.dynamics.kernel_cache import NotStoredError, only_stored
+from stiffdice.dynamics.compiling.kernel_cache import NotStoredError, only_stored
 from stiffdice.errors import StiffdiceError
 from stiffdice.scene import scene as scenes
 from stiffdice.simulation import energy_budget

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from stiffdice.cli.terminal import progress
-from stiffdice.dynamics import kernel_cache
+from stiffdice.dynamics.compiling import kernel_cache
 
 
 @pytest.fixture

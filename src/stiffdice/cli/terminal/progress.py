@@ -35,7 +35,7 @@ def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
 
     Compiling is said once, and about how long it takes by the scheme, if there is one.
     """
-    from stiffdice.dynamics.kernel_cache import telling
+    from stiffdice.dynamics.compiling.kernel_cache import telling
 
     line, next_time = _Line(), time.monotonic() + QUIET_SECONDS
     first: tuple[float, float] | None = None  # when the first part was done, compilation and all

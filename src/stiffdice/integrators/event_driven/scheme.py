@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from stiffdice.dynamics import inertia
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.compilation import njit, separate
 from stiffdice.dynamics.contact import drags
 from stiffdice.dynamics.inertia import spins_steadily
 from stiffdice.dynamics.models import registry as models
@@ -110,7 +110,7 @@ def part(model: Any, physics: Physics, state: Any, h: float, tolerance: float, m
     return left, evaluations, work
 
 
-@njit(cache=True)
+@separate("Tuple((float64, int64))")
 def _touch(
     going: tuple[bool, bool, bool], physics: Physics, state: Any, most: float, tolerance: float, effort: int
 ) -> tuple[float, int]:
@@ -236,7 +236,7 @@ def _first(physics: Physics, work: Any, tolerance: float) -> float:
     return _FIRST * tolerance ** (1.0 / dop853.ORDER) / fastest
 
 
-@njit
+@separate("Tuple((float64, int64, int64))")
 def _attempt(contact: Contact, work: Any, h: float) -> tuple[float, int, int]:
     """Step by h [s]; return the error over what is tolerated, the order of its estimate, and evaluations."""
     if work.hard[1] * h > _STIFF:

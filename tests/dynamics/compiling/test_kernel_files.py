@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from tests.forks import run_code
 
-from stiffdice.dynamics.compiler import KernelFiles
+from stiffdice.dynamics.compiling.kernel_files import KernelFiles
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 KERNEL = {"code": bytes(range(32))}
 
 
@@ -91,7 +91,7 @@ def test_a_link_in_its_place_goes_and_what_it_points_at_stays(kernels, tmp_path_
 TWO = """
 import sys
 from pathlib import Path
-from stiffdice.dynamics.compiler import KernelFiles
+from stiffdice.dynamics.compiling.kernel_files import KernelFiles
 kernels = KernelFiles(Path(sys.argv[1]), "march", "stamp")
 for k in range(400):
     if k % 7 == 0:
@@ -237,18 +237,18 @@ def test_a_copy_of_the_project_finds_its_kernels(stored, tmp_path):
 
 TOGETHER = """
 import sys
-from stiffdice.dynamics import compiler
+from stiffdice.dynamics.compiling import kernel_files
 from stiffdice.scene.scene import from_mapping
 from stiffdice.simulation.run import simulate
 
-store = compiler.KernelFiles.save
+store = kernel_files.KernelFiles.save
 
 def save(self, key, kernel):
     with open(sys.argv[1], "a") as file:
         file.write(f"{self.path(key).name}\\n")
     store(self, key, kernel)
 
-compiler.KernelFiles.save = save
+kernel_files.KernelFiles.save = save
 """
 RUN = """
 run = simulate(from_mapping({}), model="vertical", steps=10, every=1)
@@ -277,7 +277,7 @@ def test_what_one_process_compiles_another_waits_for(tmp_path, what, count):
     assert {path.name for path in tmp_path.rglob("*.nbc")} == set(kernels)
 
 
-CHOSEN = "import os, stiffdice.dynamics.compiler; print(os.environ['NUMBA_CACHE_DIR'])"
+CHOSEN = "import os, stiffdice.dynamics.compiling.compiler; print(os.environ['NUMBA_CACHE_DIR'])"
 
 
 def chosen(folder, **places):

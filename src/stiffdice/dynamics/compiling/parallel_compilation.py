@@ -7,13 +7,22 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from typing import Any
 
-from stiffdice.dynamics.kernel_cache import LOADING, TELLING, NotStoredError, only_stored
+from stiffdice.dynamics.compiling.kernel_cache import LOADING, TELLING, NotStoredError, only_stored
 from stiffdice.io.process import forked
 
 _Due = Sequence[tuple[Any, tuple[Any, ...]]]  # kernels, each with the types of its arguments
+
+
+STORING: ContextVar[bool] = ContextVar("STORING", default=False)
+
+
+def begin(compiles: Callable[[], None]) -> int:
+    """Return the number of another process that compiles a kernel and stores it; 0 where none can be forked."""
+    return forked(lambda: _alone(compiles), "python") if _can_fork() else 0
 
 
 def compile_together(calls: _Due) -> None:
@@ -23,7 +32,7 @@ def compile_together(calls: _Due) -> None:
     """
     due = [(kernel, signature) for kernel, given in calls if (signature := _not_stored(kernel, given)) is not None]
     with _another(due) if len(due) > 1 and _can_fork() else contextlib.nullcontext():
-        _compile_the_free(due)
+        _compile_the_free(due[::-1])
         for kernel, signature in due:
             kernel.compile(signature)  # waits for those that the other has begun
 
@@ -55,7 +64,7 @@ def _can_fork() -> bool:
 @contextlib.contextmanager
 def _another(due: _Due) -> Iterator[None]:
     """Let a forked process compile, too, while the block lasts."""
-    child = forked(lambda: _help(due), "python")
+    child = forked(lambda: _alone(lambda: _compile_the_free(due)), "python")
     try:
         yield
     except BaseException:
@@ -65,7 +74,8 @@ def _another(due: _Due) -> Iterator[None]:
         os.waitpid(child, 0)
 
 
-def _help(due: _Due) -> None:
-    """Compile what is free, and say nothing; what goes wrong goes wrong in the parent, too, which tells."""
+def _alone(compiles: Callable[[], None]) -> None:
+    """Compile for others, and say nothing; what goes wrong goes wrong in the parent, too, which tells."""
     TELLING.set(None)
-    _compile_the_free(due)
+    STORING.set(True)
+    compiles()

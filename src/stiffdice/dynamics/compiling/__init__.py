@@ -1,0 +1,1 @@
+"""Numba: what it compiles, in which processes, and where that is kept."""
