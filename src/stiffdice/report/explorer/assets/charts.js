@@ -24,11 +24,11 @@ function readable(value) {
   const size = Math.abs(value);
   if (value !== 0 && (size >= 1e7 || size < 1e-3)) {
     const [digits, power] = value.toExponential(2).split("e");
-    const raised = String(Number(power)).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)]));
-    return `${Number(digits) === 1 ? "" : `${Number(digits)} × `}10${raised}`.replace(/-/g, "−");
+    const raised = String(Number(power)).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
+    return `${digits.replace("-", "−")} × 10${raised}`;
   }
   const digits = size >= 1000 ? 0 : Math.max(0, 3 - Math.floor(Math.log10(size || 1)));
-  return value.toLocaleString("en-US", { maximumFractionDigits: digits }).replace("-", "−");
+  return (value + 0).toLocaleString("en-US", { maximumFractionDigits: digits }).replace("-", "−");
 }
 
 /** Return round numbers from low to high, about so many. */
@@ -36,7 +36,7 @@ function ticksOf(low, high, about) {
   const raw = (high - low) / about, power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 2.5, 5, 10].map((part) => part * power).find((part) => part >= raw);
   const ticks = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push(k * step);
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) ticks.push(k * step + 0);
   return ticks;
 }
 

@@ -22,8 +22,8 @@ function fairBand(throws) {
 function toldOfCounts(counts, others) {
   const total = counts.reduce((sum, count) => sum + count, 0), value = chiSquare(counts);
   const odd = others > 0 ? ` ${others} more did not settle and are not counted.` : "";
-  const tail = `${readable(100 * chiSquareTail(value))} %`;
-  return `${readable(total)} throws: chi-square ${readable(value)} with 5 degrees of freedom; ${tail} of fair dice have as much.${odd}`;
+  const tail = `${Number((100 * chiSquareTail(value)).toPrecision(2))} %`;
+  return `${readable(total)} throws: chi-square ${value.toFixed(1)} with 5 degrees of freedom; ${tail} of fair dice have as much.${odd}`;
 }
 
 /** Return what is said of a throw. */

@@ -1,6 +1,6 @@
 // A thrown cube in three dimensions, on a canvas: parallel projection, the camera goes with the cube.
 
-const YAW = -0.6, PITCH = 0.3; // of the view [rad]
+const YAW = -0.6, PITCH = 0.42; // of the view [rad]
 // Pips of the faces 1 to 6, in parts of half an edge along the two other edges.
 const PIPS = [
   [[0, 0]],
@@ -165,8 +165,9 @@ function paintRun(canvas, run, time) {
   const colour = (name) => style.getPropertyValue(name).trim();
   const centre = [0, 1, 2].map((axis) => run.position[3 * row + axis]);
   const edges = [0, 1, 2].map((edge) => halfEdge(run.nodes, edge, 3 * NODES * row));
-  const metres = Math.min(Math.max(highestOf(run) * 1.35, 5 * side), 11 * side);
-  const focus = [centre[0], centre[1], Math.max(0.4 * metres, centre[2] - 0.25 * metres)];
+  // The higher the cube, the farther the camera, so that the ground stays in sight.
+  const metres = Math.min(Math.max(4.5 * side, 1.5 * (centre[2] + side)), 40 * side);
+  const focus = [centre[0], centre[1], Math.max(0.38 * metres, centre[2] - 0.4 * metres)];
   if (!centre.every((part) => Math.abs(part) < 1e9)) return;
   const painter = painterOf(canvas, focus, metres);
   paintGround(painter, centre, side, colour("--grid"));

@@ -6,7 +6,7 @@ const KEPT = 4000;
 // What each control changes. low, high: what is allowed; scale: log or linear; step: of the slider where it is linear.
 const CONTROLS = [
   { key: "stiffness", label: "Stiffness S of a node", unit: "kg/s²", low: 100, high: 1e8, scale: "log" },
-  { key: "steps", label: "Time steps", unit: "steps to 10 s", low: 1000, high: MOST_STEPS, scale: "log", whole: true },
+  { key: "steps", label: "Time steps", unit: "to 10 s", low: 1000, high: MOST_STEPS, scale: "log", whole: true },
   { key: "damping", label: "Damping D of a node", unit: "kg/s", low: 0, high: 5, scale: "linear", step: 0.01 },
   { key: "friction", label: "Friction coefficient µ", unit: "no unit", low: 0, high: 1, scale: "linear", step: 0.005 },
   { key: "spin", label: "Angular momentum L", unit: "kg m²/s", low: 0, high: 0.75, scale: "linear", step: 0.01 },
@@ -158,14 +158,15 @@ function rowsOf(run) {
 function toldOf(run, milliseconds) {
   const { verdict, scene, steps } = run, omegaH = (contactFrequency(scene) * scene.duration) / steps;
   const measures = [
-    ["ωh of a flat landing", `${readable(omegaH)} (limit without damping: 2)`],
+    ["ωh of a flat landing", `${readable(omegaH)} (linear limit without damping: 2)`],
     ["largest energy in the air, over the launch's", readable(verdict.energyRatio)],
     ["largest rebound, over the one before", verdict.apexRatio === null ? "not judged: spin may rightly raise it" : readable(verdict.apexRatio)],
     ["bounces", readable(verdict.bounces)],
     ["highest place of the centre", `${readable(highestOf(run))} m`],
     ["computed in", `${Math.max(1, Math.round(milliseconds))} ms`],
   ];
-  return { line: `${readable(steps)} steps, ${verdict.sentence}`, measures };
+  const sentence = verdict.sentence[0].toUpperCase() + verdict.sentence.slice(1);
+  return { line: `${sentence}. ${readable(steps)} steps, ωh = ${omegaH.toFixed(2)}.`, measures };
 }
 
 /** Show the live kernel in an element; bases: scenes by preset, as page.py writes them. */
@@ -208,7 +209,7 @@ function mountThrow(element, bases) {
   const isExample = (steps) => Object.keys(START).every((key) => values[key] === (key === "steps" ? steps : START[key]));
   const examples = html("div", { class: "buttons", role: "group", "aria-label": "Examples at S = 10⁶ kg/s², as written" });
   for (const steps of EXAMPLES) {
-    const omegaH = readable(20000 / steps), button = html("button", { type: "button", value: steps }, `${readable(steps)} steps`);
+    const omegaH = (20000 / steps).toFixed(2), button = html("button", { type: "button", value: steps }, `${readable(steps)} steps`);
     button.append(html("small", {}, `ωh = ${omegaH}`));
     button.addEventListener("click", () => {
       Object.assign(values, START, { steps });
@@ -219,9 +220,9 @@ function mountThrow(element, bases) {
   }
 
   for (const control of CONTROLS) controls[control.key] = mountControl(control, (value) => change(control.key, value));
-  const laws = [["as_written", "as written: only below the ground (gated)"], ["as_listed", "as listed: in mid-air, too (ungated)"]];
+  const laws = [["as_written", "as written: gated"], ["as_listed", "as listed: ungated"]];
   const preset = choice("preset", "Contact law", laws, (value) => change("preset", value));
-  const models = [["sliding", "sliding: the cube does not turn"], ["tumbling", "tumbling: it turns"]];
+  const models = [["sliding", "sliding: no rotation"], ["tumbling", "tumbling"]];
   const model = choice("model", "Motion", models, (value) => change("model", value));
   function showValues() {
     for (const { key } of CONTROLS) controls[key].show(values[key]);
