@@ -16,4 +16,13 @@ language = "en"
 html_theme = "pydata_sphinx_theme"
 html_title = "stiffdice"
 html_copy_source = False
-html_theme_options = {"show_prev_next": False, "footer_end": []}
+html_use_index = False
+html_show_search_summary = False  # needs a server: pages opened as files may not read each other
+html_context = {"default_mode": "auto"}  # light or dark as the reader's system
+html_theme_options = {
+    "footer_end": [],
+    "footer_start": [],
+    "header_links_before_dropdown": 4,
+    "show_prev_next": False,
+    "secondary_sidebar_items": {"docs/[!r]*/*": ["page-toc"]},  # not beside the wide tables of the reference
+}

@@ -43,7 +43,8 @@ def _commands(parser: argparse.ArgumentParser, before: str = "") -> dict[str, ar
 def _parts(parser: argparse.ArgumentParser) -> list[str]:
     shown = [action for action in parser._actions if action.help != argparse.SUPPRESS and action.dest != "help"]
     options = any(action.option_strings for action in shown)
-    words = [parser.prog, *(_words(action) for action in shown if action.required and action.option_strings)]
+    needed = [action for action in shown if action.required and action.option_strings]
+    words = [parser.prog, *(f"{action.option_strings[0]} {_value(action)}".strip() for action in needed)]
     words += ["[OPTIONS]"] * options + [_words(action) for action in shown if not action.option_strings]
     parts = [f"{parser.description} For whoever types the command.", markdown.code(" ".join(words), "text")]
     for group in parser._action_groups:
@@ -62,10 +63,14 @@ def _title(title: str | None) -> str:
 
 def _words(action: argparse.Action) -> str:
     """Return how an option or an argument is typed."""
-    value = str(action.metavar or action.dest) if action.nargs != 0 else ""
+    value = _value(action)
     if not action.option_strings:
         return {"?": f"[{value}]", "*": f"[{value} ...]", "+": f"{value} ..."}.get(str(action.nargs), value)
     return f"{', '.join(action.option_strings)} {value}".strip()
+
+
+def _value(action: argparse.Action) -> str:
+    return str(action.metavar or action.dest) if action.nargs != 0 else ""
 
 
 def _help(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
