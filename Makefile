@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes explorer study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines install-docs paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes explorer study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs links lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,7 +20,10 @@ install:  ## set up .venv from the lock files, unless it is what they say (the o
 	@PYTHON="$(PYTHON)" requirements/install
 
 install-engines: install  ## add the engines that are measured beside ours (MuJoCo, Drake, DART, PyBullet; 0.5 GB)
-	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_engines.py
+	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_extras.py requirements/engines.lock
+
+install-docs: install  ## add what builds the documentation as a site (Sphinx; 60 MB)
+	@PYTHON="$(PYTHON)" $(BIN)/python requirements/install_extras.py requirements/docs.lock
 
 paper: install  ## rebuild everything the paper shows, into results/paper/
 	@$(RUN) paper
@@ -104,8 +107,13 @@ types: install  ## check types (mypy)
 
 check: lint types test  ## all of the above
 
-docs: install  ## write docs/reference/api.md from the docstrings of the public names, the tables of docs/reference/FORMAT.md from the schema
-	@$(BIN)/python docs/make_api.py && $(BIN)/python docs/make_format.py
+docs: install-docs  ## write the pages that follow from the code, and build all as a site: results/site/docs/index.html
+	@$(BIN)/python -m docs.make
+	@$(BIN)/python -m sphinx --quiet --fail-on-warning --conf-dir docs . results/site
+	@echo "open results/site/docs/index.html"
+
+links: install-docs  ## check the documentation's links to other sites (needs a network)
+	@$(BIN)/python -m sphinx --quiet --conf-dir docs -b linkcheck . results/linkcheck
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)
 	@for name in build requirements engines docs; do \

@@ -1,18 +1,25 @@
-"""Write the tables of docs/reference/FORMAT.md from `stiffdice.io.schema`: `make docs`."""
+"""The tables of the pages on the file format, from `stiffdice.io.schema`: `make docs`."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
+
+from docs import markdown
 
 from stiffdice.io import schema
 
-PAGE = Path(__file__).with_name("reference") / "FORMAT.md"
+# What else stands on these pages is written by hand.
+PAGES = ("reference/FORMAT.md", "reference/FORMAT-runs.md", "reference/FORMAT-sweeps.md", "reference/FORMAT-timings.md")
 
 _TABLE = r"\| {first} \|.*\n(?:\|.*\n)+"
 _ATTRIBUTES = "| attribute | type |  | what |\n| -- | -- | -- | -- |\n"
 _VARIABLES = "| variable | dimensions | type | unit |  | what |\n| -- | -- | -- | -- | -- | -- |\n"
+
+
+def pages() -> dict[str, str]:
+    """Return the texts of the pages, as they are but for their tables, which are those of the schema."""
+    return {path: page((markdown.DOCS / path).read_text(encoding="utf-8")) for path in PAGES}
 
 
 def page(text: str) -> str:
@@ -47,7 +54,3 @@ def _variables(variables: Mapping[str, schema.Variable]) -> str:
 
 def _need(part: schema.Variable) -> str:
     return part.need if part.since == "1.2" else f"{part.need} since {part.since}"
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "workflow")]
 
-import install_engines  # noqa: E402
+import install_extras  # noqa: E402
 import lock  # noqa: E402
 import room  # noqa: E402
 
@@ -105,7 +105,7 @@ def check_unused(root: Path) -> None:
 
 
 def build(root: Path, new: Path, held: int) -> None:
-    """Build an environment: what is locked, stiffdice itself, and the engines that the old one has.
+    """Build an environment: what is locked, stiffdice itself, and the extras (engines, say) that the old one has.
 
     held: a file that all that is started inherits, so that what outlives this process keeps the lock.
     """
@@ -120,10 +120,10 @@ def build(root: Path, new: Path, held: int) -> None:
     for step in steps:
         if status := call(step, held):
             raise SetUpError(f"pip ended with status {status}; .venv is as it was")
-    names = install_engines.engines(root / "requirements")
-    if there := [name for name in names if list(old.glob(f"lib/python*/site-packages/{name}-*.dist-info"))]:
-        again = [python, str(root / "requirements/install_engines.py"), str(root / "requirements"), *there]
-        call(again, held)
+    installed = {path.name.partition("-")[0] for path in old.glob("lib/python*/site-packages/*.dist-info")}
+    for locked in (root / f"requirements/{extra}.lock" for extra in install_extras.EXTRAS):
+        if there := [name for name in install_extras.asked(locked) if name.replace("-", "_") in installed]:
+            call([python, str(root / "requirements/install_extras.py"), str(locked), *there], held)
     print("stiffdice: compiling packages and, beside them, the kernels of `make paper` (about 20 s)", flush=True)
     kernels = [python, str(root / "workflow/compile_kernels.py"), "paper"]
     beside = Thread(target=call, args=(kernels, held), kwargs={"silent": True})

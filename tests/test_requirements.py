@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from requirements import install_engines
+from requirements import install_extras
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "requirements"
-LOCKS = ("build", "requirements", "engines")
+LOCKS = ("build", "requirements", *install_extras.EXTRAS)
 ENGINES = ("mujoco", "drake", "dartpy", "pybullet")
 
 
@@ -48,11 +48,12 @@ def test_what_runs_is_what_is_locked():
         assert version(package) == locked("requirements")[package]
 
 
-def test_the_engines_are_locked_to_the_versions_that_all_else_runs_with():
-    shared = locked("engines").keys() & locked("requirements").keys()
-    assert "numpy" in shared
-    for package in shared:
-        assert locked("engines")[package] == locked("requirements")[package]
+@pytest.mark.parametrize(("extra", "package"), [("engines", "numpy"), ("docs", "jinja2")])
+def test_extras_are_locked_to_the_versions_that_all_else_runs_with(extra, package):
+    shared = locked(extra).keys() & locked("requirements").keys()
+    assert package in shared
+    for name in shared:
+        assert locked(extra)[name] == locked("requirements")[name]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -66,12 +67,13 @@ def test_an_engine_that_is_here_is_the_locked_one(engine):
 
 def test_the_extra_names_what_the_lock_is_made_of():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert tuple(project["optional-dependencies"]["engines"]) == ENGINES == tuple(install_engines.engines(FOLDER))
+    assert tuple(project["optional-dependencies"]["engines"]) == ENGINES
+    assert tuple(install_extras.asked(FOLDER / "engines.lock")) == ENGINES
 
 
 def test_an_engine_is_installed_with_what_it_needs_and_nothing_of_the_others():
     lock = (FOLDER / "engines.lock").read_text()
-    parts = {engine: install_engines.needed(lock, engine) for engine in ENGINES}
+    parts = {engine: install_extras.needed(lock, engine) for engine in ENGINES}
     assert set(parts["pybullet"]) == {"pybullet"}
     assert set(parts["dartpy"]) == {"dartpy", "numpy"}
     assert {"mujoco", "mujoco-core", "numpy", "glfw"} <= set(parts["mujoco"])
@@ -84,12 +86,18 @@ def test_an_engine_is_installed_with_what_it_needs_and_nothing_of_the_others():
             assert block in lock
 
 
+def test_what_builds_the_site_is_installed_with_all_that_it_needs():
+    lock = (FOLDER / "docs.lock").read_text()
+    parts = [install_extras.needed(lock, name) for name in install_extras.asked(FOLDER / "docs.lock")]
+    assert set().union(*parts) == set(locked("docs"))
+
+
 @pytest.mark.long
 def test_an_engine_that_cannot_be_installed_is_left_out_with_a_line(tmp_path):
     (tmp_path / "engines.in").write_text("# none\n-c requirements.lock\nengine-of-none  # there is none\n")
     (tmp_path / "engines.lock").write_text(f"engine-of-none==1.0 \\\n    --hash=sha256:{'0' * 64}\n")
     done = subprocess.run(
-        [sys.executable, FOLDER / "install_engines.py", tmp_path],
+        [sys.executable, FOLDER / "install_extras.py", tmp_path / "engines.lock"],
         env=os.environ | {"PIP_NO_INDEX": "1", "PIP_CONFIG_FILE": os.devnull, "PYTHON": sys.executable},
         capture_output=True,
         text=True,

@@ -62,7 +62,7 @@ class Project:
 
     @classmethod
     def new(cls, folder: Path) -> Project:
-        for name in ("requirements/install", "requirements/set_up.py", "requirements/install_engines.py"):
+        for name in ("requirements/install", "requirements/set_up.py", "requirements/install_extras.py"):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name)
         shutil.copytree(ROOT / "workflow", folder / "workflow", ignore=shutil.ignore_patterns("__pycache__"))
@@ -76,6 +76,8 @@ class Project:
         project.lock("requirements", wheel(folder / "wheels", "tiny", "1.0"))
         project.lock("engines", wheel(folder / "wheels", "engine", "1.0") + wheel(folder / "wheels", "other", "1.0"))
         (folder / "requirements/engines.in").write_text("engine  # one\nother  # two\n")
+        project.lock("docs", wheel(folder / "wheels", "page_maker", "1.0"))
+        (folder / "requirements/docs.in").write_text("page-maker  # three\n")
         return project
 
     def lock(self, name: str, text: str) -> None:
@@ -117,8 +119,8 @@ def project(tmp_path_factory):
     assert status == 0, err
     assert out.endswith("stiffdice: .venv is ready\n")
     assert (project.venv.is_symlink(), project.version("tiny"), project.version("own")) == (True, "1.0", "1.0")
-    installed = project.call(".venv/bin/python", "requirements/install_engines.py", "requirements", "engine")
-    assert installed == (0, "stiffdice: engine is ready\n", "")
+    extra = ("requirements/install_extras.py", "requirements/engines.lock", "engine")
+    assert project.call(".venv/bin/python", *extra) == (0, "stiffdice: engine is ready\n", "")
     return project
 
 

@@ -122,8 +122,8 @@ def contact(
     """Return RATIOS, dimensions method, stiffness, damping, omega_h; not-a-number where a cube does not leave.
 
     scene: gives the cube, gravity, friction, and the speeds of the launch; the ground is level and gated. methods:
-    names of schemes and engines. stiffness [kg/s²]. damping [kg/s]. omega_h [1]: contact frequency times step size.
-    phases: of the step at touch-down, over which a bounce is averaged.
+    names of schemes and engines. stiffness [kg/s²], damping [kg/s]: of the ground. omega_h [1]: contact frequency times
+    step size. phases: of the step at touch-down, over which a bounce is averaged.
     Raises InputError for a number out of range, an engine that is not installed, and a scene whose cube would not
     bounce flat and short, or stops sliding in the bounce.
     """

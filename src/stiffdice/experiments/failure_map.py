@@ -90,9 +90,10 @@ def measure(
 ) -> xr.Dataset:
     """Return the verdict of each value of one axis at each number of steps, under both contact laws.
 
-    axis: a name of AXES. values: of that axis, in its units; its own if none are given, and always for `start`.
-    budget: most steps to compute one by one for a run; one that needs more is undecided.
-    Dimensions contact, value, steps; theory's limits have limit, contact, value.
+    axis: stiffness, damping, friction, mass, radius, spin or start. values: of that axis, in its units; its own if none
+    are given, and always for `start`. model: which motion. steps: numbers of time steps. budget: most steps to compute
+    one by one for a run; one that needs more is undecided. Dimensions contact, value, steps; theory's limits have
+    limit, contact, value.
     Raises InputError for an unknown name, a number out of range, and a spin of a cube that does not turn.
     """
     chosen = AXES[validation.choice("axis", axis, AXES)]

@@ -271,8 +271,8 @@ def beads(
 ) -> xr.Dataset:
     """Return LIGGGHTS' times of equal spheres, and the longest stable steps at an impact's deepest overlap [s].
 
-    Dimensions young [Pa] and speed [m/s]. radius [m], density [kg/m³], poisson [1]: of the spheres. scene: named in the
-    file only. Raises InputError for a number out of range.
+    young [Pa], radius [m], density [kg/m³], poisson [1]: of the spheres. speed [m/s]: at which they meet. Dimensions
+    young and speed. scene: named in the file only. Raises InputError for a number out of range.
     """
     moduli, speeds = numbers("young", young, "Pa", above=0), numbers("speed", speed, "m/s", above=0)
     size = validation.number("radius", radius, "m", above=0)

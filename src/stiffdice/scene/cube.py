@@ -40,11 +40,15 @@ def radius_of(side: float, geometry: str) -> float:
 class Cube:
     """A rigid box, the paper's cube unless it is given sides or masses.
 
-    radius [m]: centre to corner, as the paper means it. mass [kg]: in all. geometry: `printed` takes the side from the
-    paper's formula, `exact` from the radius. inertia: `solid` (m s²/6, the paper's) or `corners` (m s²/2, eight point
-    masses). sides [m]: of a box, along the axes of the upright one; half its diagonal is the radius. node_masses [kg]:
-    eight in the nodes' order, in place of a mass spread evenly. load: a part of the mass that is a point on the
-    surface. moments [kg m²]: of inertia about the centre of mass along the edges, in place of those that follow.
+    radius [m]: centre to corner, as the paper means it. mass [kg]: in all, spread equally over the eight nodes.
+    geometry: `printed` has the side −√2 + 2√(0.5 + r²), as section 2.1 prints it; `exact` has 2r/√3, a true cube.
+    inertia: `solid` is m s²/6, the paper's; `corners` is m s²/2, eight masses at the corners. sides [m]: in place of
+    `radius`, of a box along x, y, z of the upright one; half its diagonal is the radius. node_masses [kg]: in place of
+    `mass`, at the nodes in their order; `inertia` is then `corners`. load: a part of `mass` that is a point on the
+    surface, as {at: corner, mass: 1 g}, at a `corner`, at the middle of an `edge`, or of a `face`; `faces: [1, 2, 3]`
+    says which, by the pips of the faces that meet there. moments [kg m²]: of inertia about the directions of the edges
+    through the centre of mass, in place of those that follow from the masses; none greater than the sum of the others.
+
     Raises InputError for values out of range, and for a body that cannot be.
     """
 

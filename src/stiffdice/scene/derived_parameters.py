@@ -1,4 +1,11 @@
-"""Keys that say in other words what a scene stores: a side for a radius, a restitution for a damping."""
+"""Keys that say in other words what a scene stores: a side for a radius, a restitution for a damping.
+
+side [m]: in place of `radius`, exact to rounding. The geometry is then `exact` unless it is given here, whatever the
+preset; the radius that has this side is derived and stored. restitution [1]: in place of `damping`, speed up over speed
+down of a flat landing. The contact law is then `gated` unless `contact` or a preset is given: the listings' law would
+brake such a cube in the air. contact_time [s]: with `restitution`, in place of `stiffness`; how long the ground pushes
+in that landing.
+"""
 
 from __future__ import annotations
 

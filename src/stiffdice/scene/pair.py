@@ -96,7 +96,7 @@ def from_mapping(mapping: object) -> PairScene:
     """Return the scene of two boxes that plain data describe.
 
     mapping: `cubes`, two of {cube: …, launch: …} with the keys of those sections of a scene; ground, gravity and
-    duration as in a scene (config/README.md lists all).
+    duration as in a scene (docs/reference/scene.md lists all).
 
     Raises InputError naming the key, the value and what is allowed.
     """
@@ -144,7 +144,7 @@ def is_pair(mapping: object) -> bool:
 def load(path: str | Path, overrides: Sequence[str] = ()) -> PairScene:
     """Return the scene of two boxes in a YAML file.
 
-    path: of the file; config/README.md lists its keys, with units. overrides: single keys to change, each as
+    path: of the file; docs/reference/scene.md lists its keys. overrides: single keys to change, each as
     "ground.stiffness=1e6" or "cubes.0.launch.velocity=[1, 0, 0]"; the cubes are 0 and 1.
 
     Raises InputError naming the file, the key, the value and what is allowed.

@@ -37,10 +37,13 @@ PRESETS: Mapping[str, Mapping[str, str | None]] = {
 
 @dataclass(frozen=True)
 class Ground:
-    """The ground of section 2.2: an elastic plane through the origin that pushes back; constants are per node.
+    """The ground of section 2.2: an elastic plane through the origin that pushes back.
 
-    stiffness S [kg/s²], damping D [kg/s], friction coefficient mu [1], contact: the contact law.
-    normal: the direction out of the ground; any length but zero, stored with length one.
+    stiffness [kg/s²]: S, per node. damping [kg/s]: D, per node. friction [1]: mu, regularised below 10⁻⁶ r of
+    tangential speed, as in the listings. contact: under `ungated` damping and friction act on every node, in the air,
+    too, as the listings compute it; under `gated` only on nodes below the ground, as section 4.2 says. normal [1]:
+    the direction out of the ground; any length but zero, stored with length one.
+
     Raises InputError for values out of range.
     """
 
@@ -97,10 +100,11 @@ class RandomSpin:
 class Launch:
     """How the cube starts.
 
-    position [m] and velocity [m/s] of its centre, angular_momentum [kg m²/s] (three numbers or a RandomSpin),
-    orientation [rad]: rotation vector from the upright cube of cube.m.
-    node_velocity: what the nodes' velocities are in the very first step, `translation` (the centre's, as in the
-    throw listing) or `rigid` (with ω × X, equation 5).
+    position [m]: of the centre. velocity [m/s]: of the centre. angular_momentum [kg m²/s]: three numbers, or
+    {seed: 7} for the listing's random spin, each part uniform in [`low`, `high`), by default rand*0.75 + 10^-6.
+    orientation [rad]: rotation vector from the upright cube of cube.m. node_velocity: what the nodes' velocities are in
+    the very first step: `translation` is the centre's, as in the throw listing; `rigid` is with ω × X, equation 5.
+
     Raises InputError for values out of range.
     """
 
@@ -184,9 +188,9 @@ _KEYS = {
 def from_mapping(mapping: object, preset: str | None = None) -> Scene:
     """Return the scene that plain data describe.
 
-    mapping: what a scene's YAML file holds (config/README.md lists the keys): numbers in SI units, or values with units
-    as "16 mm". preset: as_listed, as_written or corrected, in place of the mapping's own `preset`; single keys go
-    before both.
+    mapping: what a scene's YAML file holds (docs/reference/scene.md lists the keys): numbers in SI units, or values
+    with units as "16 mm". preset: as_listed, as_written or corrected, in place of the mapping's own `preset`; single
+    keys go before both.
 
     Raises InputError naming the key, the value and what is allowed.
     """
@@ -231,7 +235,7 @@ def _given(mapping: object) -> object:
 def load(path: str | Path, overrides: Sequence[str] = (), preset: str | None = None) -> Scene:
     """Return the scene in a YAML file.
 
-    path: of the file; config/README.md lists its keys, with units. overrides: single keys to change, each as
+    path: of the file; docs/reference/scene.md lists its keys. overrides: single keys to change, each as
     "ground.stiffness=1e6". preset: as_listed, as_written or corrected, in place of the file's own `preset`.
 
     Raises InputError naming the file, the key, the value and what is allowed.

@@ -28,7 +28,7 @@ from stiffdice.study import catalogue
 from stiffdice.sweep.grid import Sweep
 
 # What the schema of a study's file leaves to the code.
-_NAMES = {
+NAMES = {
     "model": model_selection.CHOICES,
     "scheme": schemes.SCHEMES,
     "simulator": (backend.OURS, *engines.ENGINES),
@@ -149,7 +149,7 @@ def _check(data: object, schema: Any, source: str) -> None:
 
     numbers = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine("number", _is_number)
     kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=numbers)  # type: ignore[no-untyped-call]
-    for name, words in _NAMES.items():
+    for name, words in NAMES.items():
         schema["$defs"][name] = {"enum": list(words), "errorMessage": f"allowed is {' or '.join(words)}"}
     error = jsonschema.exceptions.best_match(kind(schema).iter_errors(data))
     if error is not None:

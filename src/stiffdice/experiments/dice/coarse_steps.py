@@ -64,7 +64,7 @@ def measure(
     scene: the die, its ground and the mean launch. omega_h [1]: of the fastest contact, at which the probabilities are
     measured by the paper's scheme; finest: that of the distribution with which they are compared. throws: of each.
     path_omega_h, path_schemes, paths: steps, schemes and number of launches for paths, compared with `event`. The rest
-    as in `landing.measure`. Raises InputError for a value out of range.
+    as of `landing`. Raises InputError for a value out of range.
     """
     launches = launches_of(orientation, velocity_spread, spin, spin_spread, seed)
     throws, paths = validation.count("throws", throws), validation.count("paths", paths)

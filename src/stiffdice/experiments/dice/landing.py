@@ -47,7 +47,7 @@ def measure(
     scene: the die, its ground and the mean launch. throws: how many. steps: to the scene's duration; None takes those
     at which the fastest contact has ωh = 0.3. orientation: `uniform` or `as_launched`. velocity_spread [m/s] and
     spin_spread [rad/s]: standard deviations of each component. spin: `gaussian`, or `scene`, which draws the angular
-    momentum as the scene's {seed, low, high} says.
+    momentum as the scene's {seed, low, high} says. seed: of the launches.
     Raises InputError for a value out of range, and where no throw settles.
     """
     launches = launches_of(orientation, velocity_spread, spin, spin_spread, seed)

@@ -72,7 +72,7 @@ def measure(
 
     scene: gives mass, volume, launch, gravity and duration; the ground is level. stretch [1]: w, of the box. offset
     [1]: of the loaded cube's centre of mass along each axis, over the side. throws: of each of the two bodies on each
-    ground. The others as of `shapes.measure`. Raises InputError for a number out of range.
+    ground. The others as of `box-faces`. Raises InputError for a number out of range.
     """
     grounds = {"restitution": numbers("restitution", restitution, "1", above=0)}
     grounds["friction"] = numbers("friction", friction, "1", at_least=0)
@@ -105,7 +105,7 @@ def launches(
     """Return χ, G and ψ by how a die is launched, dimensions speed and spin.
 
     speed [m/s]: along the ground, in the mean. spin [rad/s]: standard deviation of each component. restitution,
-    friction [1]: of the one ground. The others as of `measure`. Raises InputError for a number out of range.
+    friction [1]: of the one ground. The others as of `face-response`. Raises InputError for a number out of range.
     """
     ways = {"speed": numbers("speed", speed, "m/s", at_least=0), "spin": numbers("spin", spin, "rad/s", at_least=0)}
     seeds = iter(range(validation.count("seed", seed, at_least=0), 2**53))

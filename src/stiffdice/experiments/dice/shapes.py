@@ -55,8 +55,9 @@ def measure(
 
     scene: gives mass, volume, launch, gravity and duration; the ground is level. aspect [1]: c/a. restitution, friction
     [1], contact_time [s]: of the ground. velocity_spread [m/s], spin_spread [rad/s]: of the launches. steps: in the
-    duration. throws: of each box on each ground; seed: of the first. measured_…: published measurements to store
-    beside, c/a, part on the ends and throws of each. Raises InputError for a number out of range.
+    duration. throws: of each box on each ground; seed: of the first. measured_aspect, measured_part, measured_throws:
+    published measurements to store beside, c/a, part on the ends and throws of each. Raises InputError for a number out
+    of range.
     """
     shapes = numbers("aspect", aspect, "1", above=0)
     grounds = {"restitution": numbers("restitution", restitution, "1", above=0)}

@@ -93,11 +93,11 @@ def measure(
     """Return the edges of stability of two cubes by case and stiffness, and as predicted.
 
     scene: gives the cube that both are, gravity for the stack, and the duration. cases: head_on, edge_edge,
-    corner_face, stacked. stiffness [kg/s²]. steps: ends of the scan, over those of the linear limit; count: values in
-    it, evenly in their logarithm, jittered. members: launches of each cell, spread over the phase of a step. speed
-    [m/s]: at which the cubes near each other. zeta: damping ratio of the stack's fastest bounce. seed: of the jitter.
-    A member passes if it never has more than 1.05 of its launch's energy while nothing touches, and never sinks too
-    deep. Raises InputError for a value out of range.
+    corner_face, stacked. stiffness [kg/s²]: of all contacts. steps: ends of the scan, over those of the linear limit;
+    count: values in it, evenly in their logarithm, jittered. members: launches of each cell, spread over the phase of a
+    step. speed [m/s]: at which the cubes near each other. zeta: damping ratio of the stack's fastest bounce. seed: of
+    the jitter. A member passes if it never has more than 1.05 of its launch's energy while nothing touches, and never
+    sinks too deep. Raises InputError for a value out of range.
     """
     cases = [validation.choice("cases", case, CASES) for case in cases]
     stiffness = numbers("stiffness", stiffness, "kg/s²", above=0)

@@ -62,8 +62,8 @@ def measure(
     """Return how two cubes leave each other, dimensions pose, restitution, friction, offset.
 
     scene: gives the cube that both are. offset: of the centres across the motion, over the side, 0 to 1.2. friction:
-    between the cubes. restitution: of two flush cubes; the damping follows from it. stiffness [kg/s²]. speed [m/s]: of
-    the first cube. omega_h: of flush cubes, of the step that is halved to tell its error.
+    between the cubes. restitution: of two flush cubes; the damping follows from it. stiffness [kg/s²]: of the contact.
+    speed [m/s]: of the first cube. omega_h: of flush cubes, of the step that is halved to tell its error.
     Raises InputError for a value out of range, and where a run does not pass.
     """
     offset, friction = numbers("offset", offset, "1", at_least=0), numbers("friction", friction, "1", at_least=0)

@@ -125,9 +125,9 @@ def measure(
 ) -> xr.Dataset:
     """Return what methods make of the scenes of four threads, dimension method and those of each thread.
 
-    scene: none of its numbers is taken, the scenes are those of `threads.py`. methods: of WAYS. omega_h: ends of the
-    span; count: values in it, evenly in their logarithm. phases: of the step at touch-down, evenly. depth [1]: shares
-    of a cube's side. angle [rad]: turns, either way. duration [s]: of a stack's rest.
+    scene: none of its numbers is taken, the scenes are those of `threads.py`. methods: symplectic_euler, mujoco, drake.
+    omega_h: ends of the span; count: values in it, evenly in their logarithm. phases: of the step at touch-down,
+    evenly. depth [1]: shares of a cube's side. angle [rad]: turns, either way. duration [s]: of a stack's rest.
     Raises InputError for a number out of range, an engine that is not installed, and a method that is not of WAYS.
     """
     ways = [way for name in engines.chosen_from(methods, tuple(WAYS)) for way in WAYS[name]]

@@ -38,7 +38,8 @@ def measure(
     """Return the nodes of the measured cube and of the simulated one over time.
 
     scene: gives gravity and the contact law. data: a file of tosses. restitution, friction, contact_time [s]: of the
-    board. toss: its number, from 1 on. source: of its launch. Dimensions time, node, axis; positions also.
+    board. toss: its number, from 1 on. source: of its launch, `sample` or `flight`, a fit to all before contact.
+    Dimensions time, node, axis; positions also.
     Raises InputError as `fit.measure` does.
     """
     tosses, _ = measured(data, scene.gravity)

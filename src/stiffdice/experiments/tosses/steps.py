@@ -64,10 +64,10 @@ def measure(
     """Return errors against reality, and against the same model without steps, over ωh.
 
     scene: gives gravity and the contact law. data: a file of tosses. restitution, friction, contact_time [s]: of the
-    board. omega_h: ends of the scan, `count` values evenly in their logarithm. source: of the launches. seed: of the
-    third that was fitted, and is left out. Dimensions contact_time, omega_h, toss. `floor_…` are those of the scheme
-    `event`; of the face that of the shortest steps. `left` is the ωh up to which the mean over tosses is within 5 % of
-    its floor, or as many right faces, by criterion, with its 95 % interval by resampling tosses.
+    board. omega_h: ends of the scan, `count` values evenly in their logarithm. source: of the launches, as of `toss`.
+    seed: of the third that was fitted, and is left out. Dimensions contact_time, omega_h, toss. `floor_…` are those of
+    the scheme `event`; of the face that of the shortest steps. `left` is the ωh up to which the mean over tosses is
+    within 5 % of its floor, or as many right faces, by criterion, with its 95 % interval by resampling tosses.
     Raises InputError as `fit.measure` does.
     """
     low, high = span(omega_h)

@@ -175,11 +175,12 @@ def measure(
 ) -> xr.Dataset:
     """Return errors and force evaluations, dimensions stiffness, method, effort (NaN and 0 past a ladder's end).
 
-    problem: a name of PROBLEMS. methods: names of schemes and peers. stiffness [kg/s²]. per_decade: efforts in a decade
-    of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are made,
-    those taken at once not counted; a peer's ladder ends at its part of it (`Peer.dearness`).
-    `agreement` has the difference of each reference from the first, `floor` what half a unit in the last place grows
-    to: in the launch, and in the place during a contact, where it is one of the depth.
+    problem: flat-bounce, sliding-bounce or tumbling-throw. methods: names of schemes, of scipy_dop853, scipy_lsoda,
+    scipy_radau, and of engines; `all` leaves engines out. stiffness [kg/s²]: of the ground. per_decade: efforts in a
+    decade of steps or tolerance. steps: most of a fixed step's ladder. budget: most force evaluations of a run that are
+    made, those taken at once not counted; a peer's ladder ends at its part of it (`Peer.dearness`). `agreement` has the
+    difference of each reference from the first, `floor` what half a unit in the last place grows to: in the launch, and
+    in the place during a contact, where it is one of the depth.
     Raises InputError for a number out of range, and for a scene in which the cube does not land and leave again.
     """
     chosen = PROBLEMS[validation.choice("problem", problem, PROBLEMS)]

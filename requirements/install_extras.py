@@ -1,8 +1,8 @@
-"""Install the engines of engines.lock into the virtual environment that runs this, every file checked against its hash:
-install_engines.py [FOLDER_OF_LOCKS [NAME...]].
+"""Install what a lock file pins into the virtual environment that runs this, every file checked against its hash:
+install_extras.py FOLDER/engines.lock [NAME...].
 
-Each is installed for itself: one that has no wheel for this Python is left out with a line, and so is not in the way of
-the others. Nothing is built.
+Each package that is named in engines.in beside it is installed for itself, with what it needs: one that has no wheel
+for this Python is left out with a line, and so is not in the way of the others. Nothing is built.
 """
 
 from __future__ import annotations
@@ -16,22 +16,23 @@ import sys
 import tempfile
 from pathlib import Path
 
-HERE = Path(__file__).parent
+# What can be installed beside what requirements.lock pins, each from a lock file of its own.
+EXTRAS = ("engines", "docs")
 
 
-def engines(folder: Path) -> list[str]:
-    """Return the names in engines.in."""
-    lines = (folder / "engines.in").read_text(encoding="utf-8").splitlines()
+def asked(lock: Path) -> list[str]:
+    """Return the packages that a lock file was made for: the names in the .in file beside it."""
+    lines = lock.with_suffix(".in").read_text(encoding="utf-8").splitlines()
     return [line.split()[0] for line in lines if line and line[0] not in "#-"]
 
 
-def needed(lock: str, engine: str) -> dict[str, str]:
-    """Return the part of a lock file's text that one engine needs: pins with their hashes, by package."""
+def needed(lock: str, package: str) -> dict[str, str]:
+    """Return the part of a lock file's text that one package needs: pins with their hashes, by package."""
     blocks = {block.partition("==")[0]: block for block in re.split(r"^(?=\w)", lock, flags=re.MULTILINE)[1:]}
     # `# via` says who asked for a package: one name beside it, or one in each line below.
     asker = re.compile(r"^    #(?: via)? +([\w.-]+)$", re.MULTILINE)
     askers = {name: set(asker.findall(block)) for name, block in blocks.items()}
-    names = {engine}
+    names = {package}
     while True:
         more = {name for name, by in askers.items() if by & names} - names
         if not more:
@@ -64,16 +65,16 @@ def install(blocks: dict[str, str]) -> str:
     return (done.stderr.strip().splitlines() or [f"pip ended with status {done.returncode}"])[-1]
 
 
-def main(folder: Path, *names: str) -> int:
-    """Install what can be, of these engines or of all; return 2 if nothing could."""
-    lock = (folder / "engines.lock").read_text(encoding="utf-8")
+def main(lock: Path, *names: str) -> int:
+    """Install what can be, of these packages or of all that a lock file was made for; return 2 if nothing could."""
+    text = lock.read_text(encoding="utf-8")
     ready = 0
-    for engine in names or engines(folder):
-        wrong = install(needed(lock, engine))
+    for name in names or asked(lock):
+        wrong = install(needed(text, name))
         ready += not wrong
-        print(f"stiffdice: {engine} is {f'left out: {wrong}' if wrong else 'ready'}", flush=True)
+        print(f"stiffdice: {name} is {f'left out: {wrong}' if wrong else 'ready'}", flush=True)
     return 0 if ready else 2
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, *sys.argv[2:]))
+    sys.exit(main(Path(sys.argv[1]), *sys.argv[2:]))
