@@ -115,7 +115,7 @@ def test_the_table_of_scene_keys_has_every_key_and_its_default():
 
 
 def test_the_table_of_study_keys_has_every_key():
-    schema = yaml.safe_load((ROOT / "workflow/schemas/study.schema.yaml").read_text())
+    schema = yaml.safe_load((ROOT / "src/stiffdice/study/study.schema.yaml").read_text())
     told = " ".join(row[0] for row in table_keys("config/README.md", "Study"))
     parts = schema["properties"]
     kinds = schema["$defs"]

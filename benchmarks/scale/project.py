@@ -21,7 +21,6 @@ from stiffdice.study import config as studies
 from stiffdice.study.config import Study
 
 _PROFILE = "workflow/profiles/default"
-_SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
 class Taken(NamedTuple):
@@ -59,7 +58,7 @@ class Project:
 
     def study(self, name: str) -> Study:
         """Return a study that was stored; its scenes are read in the working folder, as copied."""
-        return studies.load(self.folder / "config" / f"{name}.yaml", self.folder / _SCHEMA)
+        return studies.load(self.folder / "config" / f"{name}.yaml")
 
     def results(self, name: str) -> Path:
         """Return where a study's results lie."""

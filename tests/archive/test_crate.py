@@ -151,7 +151,7 @@ def test_a_benchmark_that_is_none_is_told(finished, tmp_path):
 
 
 def test_results_are_described_by_their_titles_or_stages():
-    told = study.load(packing.ROOT / "config/tradeoff.yaml", packing.ROOT / "workflow/schemas/study.schema.yaml")
+    told = study.load(packing.ROOT / "config/tradeoff.yaml")
     for result in outputs.of(told):
         title = {"figure": told.figures, "table": told.tables}.get(result.stage, {}).get(result.name)
         assert crate.describe(result, told) == (title.title if title else f"{result.stage} {result.name}")

@@ -347,7 +347,7 @@ def test_a_lock_of_this_environment_has_nothing_to_tell(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.workflow
-def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema, capsys):
+def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, capsys):
     """Ours: what this process computes, a workflow in another place does, to the last bit; and a forgery differs.
 
     The code is the installed code, so nobody is asked, and nothing else in the archive is executed.
@@ -368,7 +368,7 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
         write_dataset(run.assign(ledger.data_vars), path)
     data = {preset: open_file(folder / f"results/tiny/runs/fall.{preset}.h5") for preset in ("as_listed", "as_written")}
     drawn = [str(folder / f"results/tiny/figures/position.{suffix}") for suffix in ("svg", "png")]
-    figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml", study_schema).dpi, drawn)
+    figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml").dpi, drawn)
     write_dataset(data["as_written"].assign_attrs(title="forged"), folder / RUN)
     # What `python -m snakemake` would find before the libraries.
     (folder / "yaml.py").write_text("raise SystemExit('of the archive')")

@@ -161,7 +161,7 @@ def edited(finished):
 
 
 def planned(project: Project) -> studies.Study:
-    return studies.load(project.folder / "config/tiny.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+    return studies.load(project.folder / "config/tiny.yaml")
 
 
 def test_all_files_are_there_and_open(finished):

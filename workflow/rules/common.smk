@@ -14,7 +14,6 @@ from stiffdice.study import outputs as results
 from stiffdice.study.catalogue import DRAWINGS, TABLES
 from stiffdice.sweep import partition as shards
 
-SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 BEGUN = time.time()
 
 # What this process needs besides the rules.
@@ -41,7 +40,7 @@ def study(name):
     """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
     try:
         with notes(f"stiffdice: reading config/{name}.yaml"):
-            return studies.load(f"config/{name}.yaml", SCHEMA)
+            return studies.load(f"config/{name}.yaml")
     except InputError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         sys.exit(2)

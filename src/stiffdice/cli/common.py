@@ -15,7 +15,6 @@ from stiffdice.scene import validation
 if TYPE_CHECKING:
     from stiffdice.study.config import Study
 
-SCHEMA = "workflow/schemas/study.schema.yaml"
 # Of a duration over a step size: as near as this to a whole number of steps is rounding.
 _WHOLE = 1e-12
 
@@ -77,9 +76,9 @@ def _change(text: str) -> str:
 
 
 def check_folder() -> None:
-    """Raise InputError unless this is the project's folder."""
-    if not Path(SCHEMA).is_file():
-        raise InputError(f"{SCHEMA}: No such file; call this in the project's folder")
+    """Raise InputError unless this is a project's folder, a checkout or one that uses its workflow as a module."""
+    if not Path("config").is_dir():
+        raise InputError("config/: No such folder; call this in the project's folder, which has config/ and results/")
 
 
 def study_of(name: str) -> Study:
@@ -89,7 +88,7 @@ def study_of(name: str) -> Study:
     check_folder()
     if not config.NAME.fullmatch(name):
         raise InputError(f"STUDY = {name}: allowed is the name of a file in config/, without .yaml")
-    return config.load(f"config/{name}.yaml", SCHEMA)
+    return config.load(f"config/{name}.yaml")
 
 
 def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources: str) -> Path:
