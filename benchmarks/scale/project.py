@@ -40,13 +40,12 @@ class Project:
 
     def __init__(self, folder: Path, root: Path) -> None:
         self.folder = folder
-        if not (root / "Snakefile").is_file():
+        if not (root / "workflow/Snakefile").is_file():
             raise InputError(f"{root}: needs the project's folder as the working folder")
         folder.mkdir(parents=True, exist_ok=True)
         for part in ("workflow", "config"):
             shutil.rmtree(folder / part, ignore_errors=True)
             shutil.copytree(root / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "my-*"))
-        shutil.copy(root / "Snakefile", folder)
         (folder / "src").unlink(missing_ok=True)
         (folder / "src").symlink_to((root / "src").resolve())
 

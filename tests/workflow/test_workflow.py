@@ -80,7 +80,6 @@ class Project:
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         if not own_source:  # another place would be compiled again
             (folder / "src").symlink_to(ROOT / "src")
-        shutil.copy(ROOT / "Snakefile", folder)
         (folder / "profiles").symlink_to("workflow/profiles")
         (folder / "results").mkdir()
         self.plan(TINY)

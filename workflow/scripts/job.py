@@ -168,8 +168,9 @@ class _Log:
         """Write the last lines of a job that ended well: what it made, and what memory and time it took."""
         import resource
 
-        for output in map(Path, job.output):
-            self.say(self._words.made(Path(*output.parts[2:]).as_posix(), self._words.digest_of(output)))
+        top = os.path.commonpath([job.log, *job.output])  # a study's folder: its logs lie apart
+        for output in job.output:
+            self.say(self._words.made(os.path.relpath(output, top), self._words.digest_of(Path(output))))
         self.say(self._words.memory((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) / 1e6))
         self.say(self._words.done(time.monotonic() - self._begun))
 
