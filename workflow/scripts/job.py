@@ -46,13 +46,12 @@ class Sealed:
 class Job(NamedTuple):
     """A job as plain data.
 
-    script: the file whose `make` does it. rule, wildcards, input, output, log: Snakemake's; input by name. asked: what
+    script: the file whose `make` does it. wildcards, input, output, log: Snakemake's; input by name. asked: what
     its result follows from, for the log. planned: what the study's file says of it, pickled, as unpickling imports
     what takes long. dpi: of a figure.
     """
 
     script: str
-    rule: str
     wildcards: dict[str, str]
     input: dict[str, Any]
     output: list[str]
@@ -71,7 +70,6 @@ def begin(script: str, snakemake: Any) -> NoReturn:
     params = snakemake.params
     job = Job(
         script,
-        snakemake.rule,
         dict(snakemake.wildcards.items()),
         {name: files if isinstance(files, str) else list(files) for name, files in snakemake.input.items()},
         list(snakemake.output),
