@@ -152,9 +152,10 @@ class Asked(NamedTuple):
 
 
 def asked(study: Study, root: Path = Path()) -> dict[Result, Asked]:
-    """Return what is asked of each result; root: the project, which has the scenes, and in a checkout scripts that count as code.
+    """Return what is asked of each result.
 
-    A shard has no inputs: its name is a digest of what it holds or, in a later round, of what that follows from.
+    root: the project, which has the scenes, and in a checkout the scripts, which count as code. A shard has no inputs:
+    its name is a digest of what it holds or, in a later round, of what that follows from.
     """
     found: dict[Result, Asked] = {}
     for result, below in needs(study).items():
