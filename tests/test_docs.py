@@ -47,6 +47,7 @@ PAGES = [
     "docs/how-to/archive.md",
     "docs/how-to/verify.md",
     "docs/how-to/diff.md",
+    "docs/how-to/install.md",
     "docs/how-to/status.md",
     "docs/how-to/robustness.md",
     "docs/reference/trust.md",
