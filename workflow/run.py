@@ -47,15 +47,16 @@ def seconds_of_simulation(log: Path) -> float:
 def asked_for(words: list[str]) -> list[str]:
     """Return the studies that Snakemake is asked for: by name, as `study` with --config, by files, or by default."""
     given = [found[1] for word in words if (found := re.fullmatch(r"(?:--config=)?study=(.*)", word))]
+    default = (given or ["paper"])[-1]
     there, asked = {path.stem for path in ROOT.glob("config/*.yaml")}, []
     for word in words:
         if word == "study":
-            asked.append((given or ["paper"])[-1])
+            asked.append(default)
         elif word in there:
             asked.append(word)
         elif word.startswith("results/"):
             asked.append(word.split("/")[1])
-    return sorted(there.intersection(asked or [(given or ["paper"])[-1]]))
+    return sorted(there.intersection(asked or [default]))
 
 
 def written_since(begun: float, studies: list[str], pattern: str) -> list[Path]:
