@@ -38,7 +38,6 @@ def _project(count: int) -> tempfile.TemporaryDirectory[str]:
         shutil.copytree(part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
     (copy / "src").symlink_to(Path("src").resolve())
     (copy / "profiles").symlink_to("workflow/profiles")
-    shutil.copy("Snakefile", copy)
     (copy / "config" / "cost.yaml").write_text(STUDY.format(count=count), encoding="utf-8")
     _make(copy)  # once, so that everything is compiled
     return folder
@@ -58,7 +57,7 @@ def _ready(count: int) -> Callable[[], None]:
 
 def cases(effort: Effort) -> Iterator[Case | Missing]:
     """Yield a sweep of one shard and one of some more; what they differ by is the cost of the others' jobs."""
-    if not Path("Snakefile").is_file() or importlib.util.find_spec("snakemake") is None:
+    if not Path("workflow/Snakefile").is_file() or importlib.util.find_spec("snakemake") is None:
         yield Missing("shard_jobs", "needs Snakemake, and the project's folder as the working folder")
         return
     for name, count in (("one_shard", 1), ("more_shards", 1 + effort.many)):

@@ -17,7 +17,7 @@ from stiffdice.simulation.criteria.registry import CRITERIA
 from stiffdice.study import catalogue
 from stiffdice.study.config import NAMES
 
-SCHEMA = Path(__file__).parents[1] / "workflow/schemas/study.schema.yaml"
+SCHEMA = Path(__file__).parents[1] / "src/stiffdice/study/study.schema.yaml"
 
 _SCENE_HEAD = """\
 # Keys of a scene
@@ -33,7 +33,7 @@ _STUDY_HEAD = """\
 
 Every key of a study's file: default, what is allowed, meaning. For whoever writes one.
 
-`make docs` writes this page from `workflow/schemas/study.schema.yaml`, by which studies are checked.
+`make docs` writes this page from `src/stiffdice/study/study.schema.yaml`, by which studies are checked.
 [config/README.md](../../config/README.md) introduces them. A span `{from, to, count}` has so many values from one to
 the other. Models, schemes and simulators are explained in [schemes.md](schemes.md).
 """

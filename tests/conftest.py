@@ -70,16 +70,11 @@ def columns(table: np.ndarray, *names: str) -> np.ndarray:
 
 
 @pytest.fixture(scope="session")
-def study_schema() -> Path:
-    return ROOT / "workflow" / "schemas" / "study.schema.yaml"
-
-
-@pytest.fixture(scope="session")
-def plan(study_schema):
+def plan():
     """The sweep of config/quick.yaml."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        return study.load("config/quick.yaml", study_schema).sweeps["steps-needed"]
+        return study.load("config/quick.yaml").sweeps["steps-needed"]
 
 
 @pytest.fixture(scope="session")

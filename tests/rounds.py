@@ -67,5 +67,5 @@ def asked_in_parts(asked: dict[str, Any], count: float) -> dict[str, Any]:
         path = Path(folder) / "x.yaml"
         scene = {"scene": str(ROOT / asked["scene"])}
         path.write_text(yaml.safe_dump({"question": "How long?", "sweeps": {"x": {**asked, **scene}}}))
-        plan = study.load(path, ROOT / "workflow/schemas/study.schema.yaml").sweeps["x"]
+        plan = study.load(path).sweeps["x"]
     return {**asked, "seconds_per_job": in_parts(plan, count).seconds_per_job}

@@ -138,7 +138,7 @@ def test_the_page_of_scene_keys_tells_every_key_with_its_unit_and_the_default():
     assert {row[0].strip("`") for row in keys} == every | {"preset", "gravity", "duration"} | set(PRESETS)
 
 
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/study.schema.yaml").read_text())
+SCHEMA = yaml.safe_load((ROOT / "src/stiffdice/study/study.schema.yaml").read_text())
 WORDS = (OURS, "symplectic_euler")
 NEEDED = {
     "run": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 100},
@@ -172,7 +172,7 @@ def test_the_defaults_of_a_study_that_are_told_are_those_that_it_has(tmp_path, m
     studies = []
     for plan in (least, told):
         (tmp_path / "it.yaml").write_text(yaml.safe_dump(plan))
-        studies.append(repr(load_study(tmp_path / "it.yaml", ROOT / "workflow/schemas/study.schema.yaml")))
+        studies.append(repr(load_study(tmp_path / "it.yaml", ROOT / "src/stiffdice/study/study.schema.yaml")))
     assert studies[0] == studies[1]
 
 

@@ -11,6 +11,6 @@ sys.path[:0] = [str(ROOT / "src")]
 from stiffdice.study import config, warm_up  # noqa: E402
 
 for name in sys.argv[1:]:
-    study = config.load(ROOT / f"config/{name}.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+    study = config.load(ROOT / f"config/{name}.yaml")
     for run in warm_up.short_runs(study, ROOT):
         warm_up.compile_kernels(run)

@@ -12,7 +12,6 @@ from stiffdice.study import job_log
 from stiffdice.study.catalogue import DRAWINGS
 
 FAILED = "what failed in"
-SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
 def told(root: Path, begun: float, studies: Collection[str]) -> str:
@@ -27,7 +26,7 @@ def told(root: Path, begun: float, studies: Collection[str]) -> str:
     lines = []
     for name in sorted(name for name in studies if _at_work(name, begun)):
         try:
-            failed = status.failures(status.of(study.load(f"config/{name}.yaml", SCHEMA), Path("results", name)))
+            failed = status.failures(status.of(study.load(f"config/{name}.yaml"), Path("results", name)))
         except StiffdiceError as error:
             failed = f"  {error}"
         if failed:

@@ -19,6 +19,7 @@ STAGES = (
     *("table", "figure", "animation"),
 )
 ROOT = Path(__file__).resolve().parent.parent
+SNAKEFILE = "workflow/Snakefile"
 
 # The library of this checkout, as the jobs have it.
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "workflow" / "scripts")]
@@ -46,15 +47,16 @@ def seconds_of_simulation(log: Path) -> float:
 def asked_for(words: list[str]) -> list[str]:
     """Return the studies that Snakemake is asked for: by name, as `study` with --config, by files, or by default."""
     given = [found[1] for word in words if (found := re.fullmatch(r"(?:--config=)?study=(.*)", word))]
+    default = (given or ["paper"])[-1]
     there, asked = {path.stem for path in ROOT.glob("config/*.yaml")}, []
     for word in words:
         if word == "study":
-            asked.append((given or ["paper"])[-1])
+            asked.append(default)
         elif word in there:
             asked.append(word)
         elif word.startswith("results/"):
             asked.append(word.split("/")[1])
-    return sorted(there.intersection(asked or ["paper"]))
+    return sorted(there.intersection(asked or [default]))
 
 
 def written_since(begun: float, studies: list[str], pattern: str) -> list[Path]:
@@ -168,7 +170,8 @@ def main() -> int:
     # By its name, as links to it (profiles/) are not in an archive.
     named = any(part.startswith("--workflow-profile") for part in rest)
     profile = [] if named else ["--workflow-profile", "workflow/profiles/default"]
-    command = [sys.executable, "-m", "snakemake", "--cores", str(options.cores), *profile, *rest]
+    command = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", str(options.cores)]
+    command += [*profile, *rest]
     try:
         changes, told = room.prepare(ROOT, options.cores)
         for name in studies:

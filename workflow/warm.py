@@ -113,7 +113,7 @@ def load(names: list[str]) -> Iterator[None]:
     missing = []
     for name in names:
         with contextlib.suppress(StiffdiceError):  # which Snakemake tells
-            for run in warm_up.short_runs(config.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml")):
+            for run in warm_up.short_runs(config.load(f"config/{name}.yaml")):
                 if not warm_up.load(run):
                     missing.append(run)
                 yield

@@ -21,7 +21,6 @@ from stiffdice.study import config as studies
 from stiffdice.study.config import Study
 
 _PROFILE = "workflow/profiles/default"
-_SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
 class Taken(NamedTuple):
@@ -41,13 +40,12 @@ class Project:
 
     def __init__(self, folder: Path, root: Path) -> None:
         self.folder = folder
-        if not (root / "Snakefile").is_file():
+        if not (root / "workflow/Snakefile").is_file():
             raise InputError(f"{root}: needs the project's folder as the working folder")
         folder.mkdir(parents=True, exist_ok=True)
         for part in ("workflow", "config"):
             shutil.rmtree(folder / part, ignore_errors=True)
             shutil.copytree(root / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "my-*"))
-        shutil.copy(root / "Snakefile", folder)
         (folder / "src").unlink(missing_ok=True)
         (folder / "src").symlink_to((root / "src").resolve())
 
@@ -59,7 +57,7 @@ class Project:
 
     def study(self, name: str) -> Study:
         """Return a study that was stored; its scenes are read in the working folder, as copied."""
-        return studies.load(self.folder / "config" / f"{name}.yaml", self.folder / _SCHEMA)
+        return studies.load(self.folder / "config" / f"{name}.yaml")
 
     def results(self, name: str) -> Path:
         """Return where a study's results lie."""

@@ -93,6 +93,7 @@ def _key(data: dict[str, Any], cores: int) -> str:
     digest.update(
         code_digest("stiffdice.study.config", "stiffdice.sweep.shard", "stiffdice.sweep.stability_limits").encode()
     )
-    for path in sorted([Path("Snakefile"), *Path("workflow").rglob("*.smk"), *Path("workflow/scripts").glob("*.py")]):
+    rules = (Path("workflow/Snakefile"), *Path("workflow").rglob("*.smk"))
+    for path in sorted([*rules, *Path("workflow/scripts").glob("*.py")]):
         digest.update(path.read_bytes())
     return digest.hexdigest()

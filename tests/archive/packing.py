@@ -73,7 +73,7 @@ def project(folder: Path) -> Path:
 
 def plan(folder: Path) -> study.Study:
     """Return the study `tiny` of a project; its scenes are read in the current folder."""
-    return study.load(folder / "config/tiny.yaml", folder / "workflow/schemas/study.schema.yaml")
+    return study.load(folder / "config/tiny.yaml")
 
 
 def make(planned: study.Study, folder: Path, ended: float = AN_HOUR) -> None:

@@ -87,7 +87,7 @@ def test_the_validator_would_find_what_is_missing(archive, tmp_path):
     demands = {
         ("./", "name"): "The Root Data Entity MUST have a `name`",
         ("#run", "instrument"): "The Action MUST have an instrument",
-        ("Snakefile", "programmingLanguage"): "The Main Workflow must refer to its language",
+        ("workflow/Snakefile", "programmingLanguage"): "The Main Workflow must refer to its language",
     }
     with zipfile.ZipFile(archive) as whole, zipfile.ZipFile(tmp_path / "spoilt.zip", "w") as spoilt:
         for name in whole.namelist():
@@ -124,7 +124,7 @@ def test_the_run_made_all_results_of_the_study_from_its_scenes(finished, entitie
         "config/scenes/figure-09.yaml",
         "my-scene.yaml",
     }
-    assert ids(run["instrument"]) == ids(entities["./"]["mainEntity"]) == ["Snakefile"]
+    assert ids(run["instrument"]) == ids(entities["./"]["mainEntity"]) == ["workflow/Snakefile"]
     # By the times of the benchmarks: the first job took 12.5 seconds, all ended at once.
     assert (run["startTime"], run["endTime"]) == ("2027-01-15T07:59:47+00:00", "2027-01-15T08:00:00+00:00")
     assert entities["./"]["datePublished"] == "2027-01-15"
@@ -151,7 +151,7 @@ def test_a_benchmark_that_is_none_is_told(finished, tmp_path):
 
 
 def test_results_are_described_by_their_titles_or_stages():
-    told = study.load(packing.ROOT / "config/tradeoff.yaml", packing.ROOT / "workflow/schemas/study.schema.yaml")
+    told = study.load(packing.ROOT / "config/tradeoff.yaml")
     for result in outputs.of(told):
         title = {"figure": told.figures, "table": told.tables}.get(result.stage, {}).get(result.name)
         assert crate.describe(result, told) == (title.title if title else f"{result.stage} {result.name}")
@@ -160,7 +160,7 @@ def test_results_are_described_by_their_titles_or_stages():
 def test_it_names_the_versions_that_the_data_name(finished, entities):
     told = {
         entity["name"]: entity["softwareVersion"]
-        for entity in map(entities.get, ids(entities["Snakefile"]["softwareRequirements"]))
+        for entity in map(entities.get, ids(entities["workflow/Snakefile"]["softwareRequirements"]))
     }
     data = open_file(finished[0] / "results/tiny/runs/fall.as_listed.h5")
     assert told == dict(entry.split(" ") for entry in data.attrs["libraries"].split("; ")) | {"stiffdice": __version__}

@@ -67,7 +67,7 @@ rule study:
 rule all_of_it:
     output: "results/{study}/same.txt", "results/{study}/runs.csv", "results/{study}/figures/t.svg"
     log: "results/{study}/logs/job.log"
-    script: "workflow/scripts/job.py"
+    script: "scripts/job.py"
 """
 JOB = """\
 import os, socket, sys, time
@@ -107,7 +107,7 @@ sys.exit(subprocess.run([sys.executable, "-m", "snakemake", *sys.argv[1:]]).retu
 def project(tmp_path):
     """The content of a small archive whose job is no simulation."""
     texts = {
-        "Snakefile": SNAKEFILE,
+        "workflow/Snakefile": SNAKEFILE,
         "config/tiny.yaml": yaml.safe_dump({"figures": {"t": {"draw": "work-precision", "timings": ["x"]}}}),
         "requirements/requirements.lock": "numpy==0.0.1 \\\n    --hash=sha256:00\nnot-here-at-all==1.0\n",
         "results/tiny/same.txt": "same",
@@ -328,7 +328,7 @@ def test_nothing_of_a_run_outlives_it(project, tmp_path, words, number, status):
         (lambda top: shutil.rmtree(top / "results/tiny"), "holds results of these studies: none"),
         (lambda top: shutil.copytree(top / "results/tiny", top / "results/other"), "other, tiny; allowed is one"),
         (lambda top: (top / "results/tiny").rename(top / "results/-x"), "studies: -x"),
-        (lambda top: (top / "Snakefile").unlink(), "has no Snakefile"),
+        (lambda top: (top / "workflow/Snakefile").unlink(), "has no workflow/Snakefile"),
         (lambda top: (top / "config/tiny.yaml").rename(top / "config/other.yaml"), "has no config/tiny.yaml"),
     ],
 )
@@ -347,7 +347,7 @@ def test_a_lock_of_this_environment_has_nothing_to_tell(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.workflow
-def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema, capsys):
+def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, capsys):
     """Ours: what this process computes, a workflow in another place does, to the last bit; and a forgery differs.
 
     The code is the installed code, so nobody is asked, and nothing else in the archive is executed.
@@ -355,7 +355,6 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
     folder = tmp_path / "content"
     for name in ("workflow", "config", "src", "requirements"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
-    shutil.copy(ROOT / "Snakefile", folder)
     (folder / "config/tiny.yaml").write_text(yaml.safe_dump(STUDY))
     for path in (RUN, "results/tiny/figures/x"):
         (folder / path).parent.mkdir(parents=True)
@@ -368,7 +367,7 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
         write_dataset(run.assign(ledger.data_vars), path)
     data = {preset: open_file(folder / f"results/tiny/runs/fall.{preset}.h5") for preset in ("as_listed", "as_written")}
     drawn = [str(folder / f"results/tiny/figures/position.{suffix}") for suffix in ("svg", "png")]
-    figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml", study_schema).dpi, drawn)
+    figures.draw("position", data, "Position", studies.load(folder / "config/tiny.yaml").dpi, drawn)
     write_dataset(data["as_written"].assign_attrs(title="forged"), folder / RUN)
     # What `python -m snakemake` would find before the libraries.
     (folder / "yaml.py").write_text("raise SystemExit('of the archive')")
@@ -387,7 +386,7 @@ def test_a_study_is_the_same_again_from_its_archive_alone(tmp_path, study_schema
 def listed():
     """The digests that a manifest of this project's code has, and of a scene."""
     files = [file for top in ("src", "workflow") for file in contents.tree(ROOT, top, "code")]
-    named = {file.path: file.source for file in files} | {name: ROOT / name for name in ("Snakefile", "Makefile")}
+    named = {file.path: file.source for file in files} | {"Makefile": ROOT / "Makefile"}
     return {name: manifest.digest_of(path) for name, path in named.items()} | {"config/scenes/mine.yaml": "0" * 64}
 
 
@@ -404,7 +403,7 @@ def test_this_projects_code_is_the_installed_code(listed):
         ("src/numpy/__init__.py", "0" * 64),
         ("workflow/run.py", "0" * 64),
         ("workflow/profiles/default/config.yaml", None),
-        ("Snakefile", "0" * 64),
+        ("workflow/Snakefile", "0" * 64),
     ],
 )
 def test_one_file_makes_it_other_code(listed, name, digest):
@@ -426,5 +425,5 @@ def test_a_package_that_is_no_checkout_has_no_workflow_to_run(listed, tmp_path, 
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(rebuilding, "PACKAGE", package)
     code = rebuilding.compared_code(ROOT, listed)
-    assert {Path(name).parts[0] for name in code.other} == {"Snakefile", "workflow"}
-    assert "a package has no Snakefile and no workflow/, a checkout has" in str(code)
+    assert {Path(name).parts[0] for name in code.other} == {"workflow"}
+    assert "a package has no workflow/, a checkout has" in str(code)

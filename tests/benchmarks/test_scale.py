@@ -28,7 +28,6 @@ from stiffdice.sweep.grid import geometric
 
 ROOT = Path(__file__).parents[2]
 MILLION = ROOT / "config" / "million.yaml"
-SCHEMA = ROOT / "workflow" / "schemas" / "study.schema.yaml"
 FEW = """\
 question: Does it measure?
 sweeps:
@@ -44,7 +43,7 @@ sweeps:
 
 def test_a_million_is_a_million(monkeypatch):
     monkeypatch.chdir(ROOT)
-    assert runs_of(studies.load(MILLION, SCHEMA)) == pytest.approx(1e6, rel=0.01)
+    assert runs_of(studies.load(MILLION)) == pytest.approx(1e6, rel=0.01)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.1])
@@ -162,7 +161,7 @@ def test_the_table_says_what_the_files_say(measured, monkeypatch):
     }
     runs = 320
     top = folder / "project" / "results" / f"runs-{runs}"
-    plan = studies.load(folder / f"project/config/runs-{runs}.yaml", SCHEMA)
+    plan = studies.load(folder / f"project/config/runs-{runs}.yaml")
     assert told[runs, "runs"] == runs_of(plan) == 4 * open_file(top / "sweeps/sliding/sweep.h5").sizes["cell"]
     made = [result for result in outputs.of(plan) if result.stage == "shard"]
     assert told[runs, "shards"] == len(made) == len(list(top.rglob("shards/*.h5")))

@@ -57,7 +57,6 @@ class Project:
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         (folder / "src").symlink_to(ROOT / "src")  # another place would be compiled again
         (folder / "profiles").symlink_to("workflow/profiles")
-        shutil.copy(ROOT / "Snakefile", folder)
         (folder / "results").mkdir()
         (folder / "config" / "small.yaml").write_text(yaml.safe_dump(SMALL))
         return cls(folder)

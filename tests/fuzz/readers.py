@@ -17,7 +17,6 @@ from tests.fuzz import hdf5_blocks, mutations
 from stiffdice.errors import LONGEST, InputError, RefusedError
 
 TOP = Path(__file__).parent.parent.parent
-SCHEMA = TOP / "workflow" / "schemas" / "study.schema.yaml"
 
 
 class Reader(NamedTuple):
@@ -101,7 +100,7 @@ def studies() -> Reader:
         path = folder / "quick.yaml"
         path.write_bytes(data)
         try:
-            found = study.load(path, SCHEMA)
+            found = study.load(path)
         except InputError as error:
             one_line(error)
             assert str(error).startswith(f"{path}: ")

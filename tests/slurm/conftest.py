@@ -50,7 +50,6 @@ class Project:
         for name in ("workflow", "config"):
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         (folder / "src").symlink_to(ROOT / "src")  # another place would be compiled again
-        shutil.copy(ROOT / "Snakefile", folder)
         (folder / "results").mkdir()
         (folder / "config" / "small.yaml").write_text(yaml.safe_dump(study))
         self.results = folder / "results" / "small"

@@ -34,14 +34,14 @@ SCENE = "config/scenes/figure-13.yaml"
 
 
 @pytest.fixture(scope="module")
-def paper(study_schema):
+def paper():
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(CONFIG.parent)
-        return study.load(CONFIG / "paper.yaml", study_schema)
+        return study.load(CONFIG / "paper.yaml")
 
 
 @pytest.fixture
-def changed(tmp_path, study_schema):
+def changed(tmp_path):
     """Load config/quick.yaml with some keys changed (None takes one away)."""
 
     def load(changes):
@@ -57,7 +57,7 @@ def changed(tmp_path, study_schema):
                 part[last] = value
         file = tmp_path / "quick.yaml"
         file.write_text(yaml.safe_dump(data))
-        return study.load(file, study_schema)
+        return study.load(file)
 
     return load
 
@@ -361,12 +361,12 @@ def test_a_sweep_of_the_ground_that_a_restitution_is_for_has_it(changed):
     assert flat_bounce.restitution(dataclasses.replace(scene, gravity=0), 1.0) == pytest.approx(0.5, rel=1e-12)
 
 
-def test_a_study_that_is_not_there_is_told_with_those_that_are(tmp_path, study_schema):
+def test_a_study_that_is_not_there_is_told_with_those_that_are(tmp_path):
     told = r"config/stabilty.yaml: there is no study stabilty; .* quick, .*stability.*; did you mean stability\?$"
     with pytest.raises(InputError, match=told):
-        study.load(CONFIG / "stabilty.yaml", study_schema)
+        study.load(CONFIG / "stabilty.yaml")
     with pytest.raises(InputError, match=f"there is no study x; {tmp_path}/ has none$"):
-        study.load(tmp_path / "x.yaml", study_schema)
+        study.load(tmp_path / "x.yaml")
 
 
 ROCKING = {"measure": "rocking", "scene": SCENE}
@@ -505,9 +505,9 @@ def test_a_study_may_name_what_the_code_knows(changed, key, wrong, named, allowe
     assert str(error.value).endswith(f"{SWEEP}.{named}: allowed is {' or '.join(allowed)}")
 
 
-def test_the_schema_names_nothing_that_a_registry_names(study_schema):
+def test_the_schema_names_nothing_that_a_registry_names():
     """Names are looked up when a study is read; presets, part of the paper, are written there."""
-    text = study_schema.read_text()
+    text = Path(study.__file__).with_name("study.schema.yaml").read_text()
     assert yaml.safe_load(text)["$defs"]["run"]["properties"]["presets"]["items"]["enum"] == list(PRESETS)
     looked_up = (catalogue.DRAWINGS, catalogue.TABLES, catalogue.EXPERIMENTS, catalogue.TIMINGS, CRITERIA)
     for registry in (*looked_up, MODELS, SCHEMES, ENGINES, CONTACT_LAWS):
@@ -533,7 +533,7 @@ def test_a_criterion_that_is_none_is_told_though_no_sweep_asks_it(changed):
 
 
 @pytest.mark.parametrize("kind", ["runs", "sweeps"])
-def test_a_scheme_that_does_not_apply_is_told_when_the_study_is_read(kind, study_schema, tmp_path):
+def test_a_scheme_that_does_not_apply_is_told_when_the_study_is_read(kind, tmp_path):
     data = yaml.safe_load((TOP / "config/quick.yaml").read_text())
     part = {"scene": str(TOP / "config/scenes/figure-04.yaml"), "model": "tumbling", "scheme": "exact"}
     if kind == "runs":
@@ -545,7 +545,7 @@ def test_a_scheme_that_does_not_apply_is_told_when_the_study_is_read(kind, study
     path = tmp_path / "wrong.yaml"
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(InputError, match=f"{kind}.*scheme = exact, model = tumbling: allowed is a model that does not"):
-        study.load(path, study_schema)
+        study.load(path)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import time
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +15,9 @@ from stiffdice.sweep import partition
 
 
 @pytest.fixture
-def load(study_schema, monkeypatch):
-    monkeypatch.chdir(study_schema.parents[2])
-    return lambda name: studies.load(f"config/{name}.yaml", study_schema)
+def load(monkeypatch):
+    monkeypatch.chdir(Path(__file__).parents[2])
+    return lambda name: studies.load(f"config/{name}.yaml")
 
 
 @pytest.fixture

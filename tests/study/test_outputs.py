@@ -12,9 +12,9 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.long
-def test_other_measurements_are_another_plan(tmp_path, study_schema, monkeypatch):
+def test_other_measurements_are_another_plan(tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
-    study = config.load("config/tosses.yaml", study_schema)
+    study = config.load("config/tosses.yaml")
     (tmp_path / "config" / "measurements").mkdir(parents=True)
     (tmp_path / "config" / "scenes").symlink_to(ROOT / "config" / "scenes")
     (tmp_path / "workflow").symlink_to(ROOT / "workflow")

@@ -31,13 +31,13 @@ def _at_the_top():
 
 
 @pytest.fixture(scope="module")
-def load(tmp_path_factory, study_schema):
+def load(tmp_path_factory):
     """Load a study of one sweep."""
     path = tmp_path_factory.mktemp("study") / "mine.yaml"
 
     def read(sweep):
         path.write_text(yaml.safe_dump({"question": "How many?", "sweeps": {"mine": sweep}}))
-        return path, study.load(path, study_schema).sweeps["mine"]
+        return path, study.load(path).sweeps["mine"]
 
     read.path = path
     return read

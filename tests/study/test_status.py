@@ -32,7 +32,7 @@ LATER = 2_000_000_000  # s since the epoch
 def study():
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        return studies.load("config/quick.yaml", "workflow/schemas/study.schema.yaml")
+        return studies.load("config/quick.yaml")
 
 
 class Made:
@@ -281,7 +281,7 @@ def test_needs_are_as_the_workflow_has_them(study):
 @pytest.mark.long
 def test_every_study_of_the_project_can_be_told(name, monkeypatch, tmp_path):
     monkeypatch.chdir(ROOT)
-    found = status.of(studies.load(f"config/{name}.yaml", "workflow/schemas/study.schema.yaml"), tmp_path)
+    found = status.of(studies.load(f"config/{name}.yaml"), tmp_path)
     for told in (status.as_text(found), status.as_line(found), json.dumps(status.as_data(found))):
         assert told.startswith(name) or f'"study": "{name}"' in told
 

@@ -22,7 +22,7 @@ LOAD = """
 import sys
 from stiffdice.simulation import run
 from stiffdice.study import config, warm_up
-runs = list(warm_up.short_runs(config.load(sys.argv[1], "workflow/schemas/study.schema.yaml")))
+runs = list(warm_up.short_runs(config.load(sys.argv[1])))
 print(len(runs), sum(map(warm_up.load, runs)), len(run._march.dispatcher.overloads))
 """
 # Runs one of them.

@@ -269,7 +269,7 @@ import dataclasses, resource, sys
 from stiffdice.study import config as study
 from stiffdice.sweep.shard import compute_shard
 from stiffdice.sweep.grid import Piece
-plan = study.load("config/quick.yaml", "workflow/schemas/study.schema.yaml").sweeps["steps-needed"]
+plan = study.load("config/quick.yaml").sweeps["steps-needed"]
 plan = dataclasses.replace(plan, members=int(sys.argv[1]), contact=("gated",))
 column = plan.columns()[0]
 compute_shard(plan, [Piece(column, plan.scan(column))], sys.argv[2])

@@ -31,7 +31,7 @@ def duration(monkeypatch):
 def study(monkeypatch, tmp_path, request):
     """The study that the test names, or `quick`, in a folder in which none of its results is."""
     monkeypatch.chdir(ROOT)
-    found = studies.load(f"config/{getattr(request, 'param', 'quick')}.yaml", "workflow/schemas/study.schema.yaml")
+    found = studies.load(f"config/{getattr(request, 'param', 'quick')}.yaml")
     monkeypatch.chdir(tmp_path)
     return found
 

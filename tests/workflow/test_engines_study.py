@@ -24,7 +24,7 @@ def installed(engine):
 def planned():
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        return study.load("config/engines.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+        return study.load("config/engines.yaml")
 
 
 def test_every_engine_that_is_installed_is_asked_and_every_other_told(planned):

@@ -80,7 +80,6 @@ class Project:
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         if not own_source:  # another place would be compiled again
             (folder / "src").symlink_to(ROOT / "src")
-        shutil.copy(ROOT / "Snakefile", folder)
         (folder / "profiles").symlink_to("workflow/profiles")
         (folder / "results").mkdir()
         self.plan(TINY)
@@ -161,7 +160,7 @@ def edited(finished):
 
 
 def planned(project: Project) -> studies.Study:
-    return studies.load(project.folder / "config/tiny.yaml", ROOT / "workflow/schemas/study.schema.yaml")
+    return studies.load(project.folder / "config/tiny.yaml")
 
 
 def test_all_files_are_there_and_open(finished):

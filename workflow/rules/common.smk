@@ -14,11 +14,14 @@ from stiffdice.study import outputs as results
 from stiffdice.study.catalogue import DRAWINGS, TABLES
 from stiffdice.sweep import partition as shards
 
-SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "study.schema.yaml"
 BEGUN = time.time()
 
-# What this process needs besides the rules.
-sys.path += [str(Path(workflow.basedir) / "workflow"), str(Path(workflow.basedir) / "workflow" / "scripts")]
+# What this process needs besides the rules. Of a module that Snakemake reads from the net, it fetches what scripts share.
+FOLDER = Path(workflow.snakefile).resolve().parent.parent
+if not FOLDER.is_dir():
+    SHARED = [Path(workflow.source_path(f"../scripts/{name}")) for name in ("inputs.py", "job.py")]
+    FOLDER = SHARED[0].parent.parent
+sys.path += [str(FOLDER), str(FOLDER / "scripts")]
 
 from job import Sealed
 
@@ -41,10 +44,16 @@ def study(name):
     """Return the study in config/NAME.yaml; a mistake in it ends Snakemake with one line and exit status 2."""
     try:
         with notes(f"stiffdice: reading config/{name}.yaml"):
-            return studies.load(f"config/{name}.yaml", SCHEMA)
+            return studies.load(f"config/{name}.yaml")
     except InputError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+@cache
+def top_of(name):
+    """Return the folder of a study's results, with the prefix that a module may have; rules and inputs name it without."""
+    return Path(str(rules.trajectory.output[0]).partition("/runs/")[0].format(study=name))
 
 
 @cache
@@ -52,7 +61,7 @@ def needs_of(name):
     """Return what each result of a study is made from; a link to nothing in the place of one ends Snakemake (2)."""
     with notes(f"stiffdice: planning the sweeps of {name}"):
         found = results.needs(study(name))
-    for line in filter(None, (results.dangling(result, Path("results", name)) for result in found)):
+    for line in filter(None, (results.dangling(result, top_of(name)) for result in found)):
         print(f"stiffdice: {printable(line)}", file=sys.stderr)
         sys.exit(2)
     return {(result.stage, result.name): (result, parts) for result, parts in found.items()}
@@ -80,7 +89,7 @@ def asked_of(stage, name):
 
 @cache
 def stale_files(name):
-    top = Path("results", name)
+    top = top_of(name)
     return [f"{top}/{file}" for result in results.stale(asked_by(name), top) for file in result.files]
 
 
@@ -136,7 +145,7 @@ def survey_of_shard(wildcards):
     Of what depends by ancient files alone on a job that is due, Snakemake does not ask whether it is due itself.
     """
     files = made_from("survey", "shard", "{sweep}/{shard}")(wildcards)
-    shard = f"results/{wildcards.study}/sweeps/{wildcards.sweep}/shards/{wildcards.shard}.h5"
+    shard = f"{top_of(wildcards.study)}/sweeps/{wildcards.sweep}/shards/{wildcards.shard}.h5"
     return files if workflow.is_main_process and shard in stale_files(wildcards.study) else ancient(files)
 
 
@@ -189,7 +198,7 @@ def tell_of_cluster():
     if on_cluster():
         import ending
 
-        print(ending.told(Path(workflow.basedir), BEGUN, {*jobs_due().values()}), file=sys.stderr)
+        print(ending.told(Path(), BEGUN, {*jobs_due().values()}), file=sys.stderr)
 
 
 @cache
@@ -204,7 +213,7 @@ def one_at_a_time():
 
     try:
         for name in sorted({*jobs_due().values()}):
-            lock.hold(Path(workflow.basedir), name)
+            lock.hold(Path(), name)
     except lock.RunningError as error:
         print(f"stiffdice: {error}", file=sys.stderr)
         sys.exit(2)
@@ -225,7 +234,7 @@ def clear_way():
 def set_aside_changed():
     """Keep, as NAME.damaged, what took the place of what a job made, before Snakemake removes it to make that again."""
     for name in {*jobs_due().values()}:
-        top = Path("results", name)
+        top = top_of(name)
         for result in results.stale(asked_by(name), top):
             told = job_log.read(top / result.log)
             if told is None or f"{top}/{result.benchmark}" not in jobs_due():

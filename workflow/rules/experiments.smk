@@ -6,19 +6,19 @@ rule experiment:
         not_stale,
     output:
         "results/{study}/experiments/{experiment}.h5",
-    params:
-        planned=sealed("experiment"),
-        asked=asked_of("experiment", "{experiment}"),
     log:
         "results/{study}/logs/experiment/{experiment}.log",
     benchmark:
         "results/{study}/benchmarks/experiment/{experiment}.tsv"
     priority: 20
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(1000),
         runtime=growing(30),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("experiment"),
+        asked=asked_of("experiment", "{experiment}"),
     script:
         "../scripts/measure.py"
 
@@ -28,12 +28,12 @@ rule experiment:
 use rule experiment as timing with:
     output:
         "results/{study}/benchmarks/timings/{timing}.h5",
-    params:
-        planned=sealed("timing"),
-        asked=asked_of("timings", "{timing}"),
     log:
         "results/{study}/logs/timings/{timing}.log",
     benchmark:
         "results/{study}/benchmarks/timings/{timing}.tsv"
     priority: 0
     threads: lambda wildcards: 1 if on_cluster() else workflow.cores
+    params:
+        planned=sealed("timing"),
+        asked=asked_of("timings", "{timing}"),

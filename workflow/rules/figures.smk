@@ -13,19 +13,19 @@ rule figure:
             labels={"what": "{figure}"},
         ),
         "results/{study}/figures/{figure}.png",
-    params:
-        planned=sealed("figure"),
-        dpi=lambda wildcards: study(wildcards.study).dpi,
-        asked=asked_of("figure", "{figure}"),
     log:
         "results/{study}/logs/figure/{figure}.log",
     benchmark:
         "results/{study}/benchmarks/figure/{figure}.tsv"
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(700),
         runtime=growing(5),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("figure"),
+        dpi=lambda wildcards: study(wildcards.study).dpi,
+        asked=asked_of("figure", "{figure}"),
     script:
         "../scripts/figure.py"
 
@@ -38,14 +38,14 @@ use rule figure as animation with:
             category="{study}",
             labels={"what": "{figure}"},
         ),
-    params:
-        planned=sealed("figure"),
-        dpi=80,  # for screens, whatever the study asks of its PNG files
-        asked=asked_of("animation", "{figure}"),
     log:
         "results/{study}/logs/animation/{figure}.log",
     benchmark:
         "results/{study}/benchmarks/animation/{figure}.tsv"
+    params:
+        planned=sealed("figure"),
+        dpi=80,  # for screens, whatever the study asks of its PNG files
+        asked=asked_of("animation", "{figure}"),
 
 
 rule table:
@@ -60,17 +60,17 @@ rule table:
             labels={"what": "{table}"},
         ),
         csv="results/{study}/tables/{table}.csv",
-    params:
-        planned=sealed("table"),
-        asked=asked_of("table", "{table}"),
     log:
         "results/{study}/logs/table/{table}.log",
     benchmark:
         "results/{study}/benchmarks/table/{table}.tsv"
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(700),
         runtime=growing(5),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("table"),
+        asked=asked_of("table", "{table}"),
     script:
         "../scripts/table.py"

@@ -6,17 +6,17 @@ rule trajectory:
         not_stale,
     output:
         "results/{study}/runs/{run}.{preset}.h5",
-    params:
-        planned=sealed("run"),
-        asked=asked_of("trajectory", "{run}.{preset}"),
     log:
         "results/{study}/logs/trajectory/{run}.{preset}.log",
     benchmark:
         "results/{study}/benchmarks/trajectory/{run}.{preset}.tsv"
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(700),
         runtime=growing(5),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("run"),
+        asked=asked_of("trajectory", "{run}.{preset}"),
     script:
         "../scripts/trajectory.py"

@@ -9,19 +9,19 @@ rule shard:
         survey=survey_of_shard,
     output:
         "results/{study}/sweeps/{sweep}/shards/{shard}.h5",
-    params:
-        planned=sealed("sweep"),
-        asked=asked_of("shard", "{sweep}/{shard}"),
     log:
         "results/{study}/logs/shard/{sweep}/{shard}.log",
     benchmark:
         "results/{study}/benchmarks/shard/{sweep}/{shard}.tsv"
     priority: 10
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(900),
         runtime=lambda wildcards, attempt: minutes_of(shard_of(wildcards)) * 2 ** (attempt - 1),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("sweep"),
+        asked=asked_of("shard", "{sweep}/{shard}"),
     script:
         "../scripts/shard.py"
 
@@ -34,19 +34,19 @@ rule survey:
         surveys=made_from("survey", "survey", "{sweep}/{round}"),
     output:
         sweep="results/{study}/sweeps/{sweep}/surveys/{round}.h5",
-    params:
-        planned=sealed("sweep"),
-        asked=asked_of("survey", "{sweep}/{round}"),
     log:
         "results/{study}/logs/survey/{sweep}/{round}.log",
     benchmark:
         "results/{study}/benchmarks/survey/{sweep}/{round}.tsv"
     priority: 10
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(1000),
         runtime=growing(10),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("sweep"),
+        asked=asked_of("survey", "{sweep}/{round}"),
     script:
         "../scripts/collect.py"
 
@@ -59,19 +59,19 @@ rule collect:
     output:
         sweep="results/{study}/sweeps/{sweep}/sweep.h5",
         table="results/{study}/sweeps/{sweep}/shards.csv",
-    params:
-        planned=sealed("sweep"),
-        asked=asked_of("collect", "{sweep}"),
     log:
         "results/{study}/logs/collect/{sweep}.log",
     benchmark:
         "results/{study}/benchmarks/collect/{sweep}.tsv"
     priority: 10
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(1000),
         runtime=growing(10),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        planned=sealed("sweep"),
+        asked=asked_of("collect", "{sweep}"),
     script:
         "../scripts/collect.py"
 
@@ -88,17 +88,17 @@ rule frontier:
             category="{study}",
             labels={"what": "{sweep}: the numbers behind the frontier"},
         ),
-    params:
-        asked=asked_of("frontier", "{sweep}"),
     log:
         "results/{study}/logs/frontier/{sweep}.log",
     benchmark:
         "results/{study}/benchmarks/frontier/{sweep}.tsv"
     priority: 10
+    conda:
+        "../envs/stiffdice.yaml"
     resources:
         mem_mb=growing(1000),
         runtime=growing(10),
-    conda:
-        "../envs/stiffdice.yaml"
+    params:
+        asked=asked_of("frontier", "{sweep}"),
     script:
         "../scripts/frontier.py"

@@ -20,8 +20,8 @@ def make(job: Job, say: Say) -> None:
     asked, lines = job.plan(), [_HEAD]
     found = collect(_checked(job, lines, say), asked.criteria, asked.config)
     write_dataset(found, job.output[0])
-    if job.rule == "collect":
-        write_bytes(("\n".join(lines) + "\n").encode(), job.output[1])
+    for table in job.output[1:]:  # a survey has none
+        write_bytes(("\n".join(lines) + "\n").encode(), table)
     say(f"{len(lines) - 1} shards collected")
 
 

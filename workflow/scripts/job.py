@@ -46,13 +46,12 @@ class Sealed:
 class Job(NamedTuple):
     """A job as plain data.
 
-    script: the file whose `make` does it. rule, wildcards, input, output, log: Snakemake's; input by name. asked: what
+    script: the file whose `make` does it. wildcards, input, output, log: Snakemake's; input by name. asked: what
     its result follows from, for the log. planned: what the study's file says of it, pickled, as unpickling imports
     what takes long. dpi: of a figure.
     """
 
     script: str
-    rule: str
     wildcards: dict[str, str]
     input: dict[str, Any]
     output: list[str]
@@ -71,7 +70,6 @@ def begin(script: str, snakemake: Any) -> NoReturn:
     params = snakemake.params
     job = Job(
         script,
-        snakemake.rule,
         dict(snakemake.wildcards.items()),
         {name: files if isinstance(files, str) else list(files) for name, files in snakemake.input.items()},
         list(snakemake.output),
@@ -168,9 +166,9 @@ class _Log:
         """Write the last lines of a job that ended well: what it made, and what memory and time it took."""
         import resource
 
-        for output in map(Path, job.output):
-            name = Path(*output.parts[2:] or output.parts[-1:]).as_posix()
-            self.say(self._words.made(name, self._words.digest_of(output)))
+        top = os.path.commonpath([job.log, *job.output])  # a study's folder: its logs lie apart
+        for output in job.output:
+            self.say(self._words.made(os.path.relpath(output, top), self._words.digest_of(Path(output))))
         self.say(self._words.memory((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) / 1e6))
         self.say(self._words.done(time.monotonic() - self._begun))
 

@@ -11,7 +11,7 @@ def make(job: Job, say: Say) -> None:
     from stiffdice.simulation.dataset import config_attributes
     from stiffdice.study.catalogue import EXPERIMENTS, TIMINGS
 
-    kind, planned = job.rule, job.plan()
+    kind, planned = "timing" if "timing" in job.wildcards else "experiment", job.plan()
     scene = scenes.load(planned.scene, planned.changes)
     measure = {"experiment": EXPERIMENTS, "timing": TIMINGS}[kind][planned.measure].load()
     watch = Stopwatch()

@@ -25,7 +25,7 @@ _KINDS = {"figure": SHOWN, "animation": SHOWN, "table": SHOWN, "timings": LOGS}
 
 # Of the project, files and whole folders.
 _PROJECT = dict.fromkeys(("CHANGELOG.md", "CITATION.cff", "LICENSE", "README.md", "results/README.md"), TEXT)
-_PROJECT |= dict.fromkeys(("Makefile", "Snakefile", "pyproject.toml", "src", "workflow"), CODE)
+_PROJECT |= dict.fromkeys(("Makefile", "pyproject.toml", "src", "workflow"), CODE)
 _PROJECT |= {"requirements": LOCK}
 
 # What a job in progress, an interrupted one, a damaged result or Python leaves behind, and archives themselves.
@@ -99,7 +99,7 @@ def tree(root: Path, top: str, kind: str) -> Iterator[File]:
     root: the project's folder.
     """
     if not (root / top).exists():
-        raise InputError(f"{top}: not here; an archive is made in the project's folder")
+        raise InputError(f"{top}: not here; an archive is made in a checkout, with all that made the results")
     for name, source in manifest.files_in(root / top) if (root / top).is_dir() else [("", root / top)]:
         path = f"{top}/{name}" if name else top
         if any(part.startswith(".") or part.endswith(_LEFT_OUT) for part in name.split("/")):

@@ -34,6 +34,7 @@ _PROFILES = {
 _WORKFLOW_PROFILE = "https://bioschemas.org/profiles/ComputationalWorkflow/1.0-RELEASE"
 # Schema.org has had this property since its version 12, RO-Crate 1.1 goes by version 10.
 _TERMS = {"sha256": "http://schema.org/sha256"}
+_WORKFLOW = "workflow/Snakefile"
 _NETCDF = "https://docs.unidata.ucar.edu/netcdf-c/current/file_format_specifications.html"
 
 # Besides those that Python knows.
@@ -302,7 +303,7 @@ class _Crate:
             url = home or ({"@id": "README.md"} if name == "stiffdice" else None)
             told = {"name": name, "softwareVersion": release, "url": url}
             software.append(self._add(f"{home}#{quote(f'{name}-{release}')}", "SoftwareApplication", **told))
-        about = self._said("Snakefile") | {
+        about = self._said(_WORKFLOW) | {
             "name": "stiffdice: how many time steps a stiff ground costs",
             "description": "From a study to runs, shards, sweeps, frontiers, figures and tables.",
             "version": self.facts.citation.version,
@@ -312,7 +313,7 @@ class _Crate:
             "softwareRequirements": software,
         }
         return self.crate.add_workflow(
-            dest_path="Snakefile", main=True, lang="snakemake", lang_version=number, properties=about
+            dest_path=_WORKFLOW, main=True, lang="snakemake", lang_version=number, properties=about
         )
 
     def _results(self) -> list[Any]:

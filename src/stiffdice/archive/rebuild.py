@@ -39,7 +39,7 @@ _NOTHING = "nothing"  # an empty folder, for results that are not in their place
 _READ = (".yaml", ".yml", ".json")
 
 # What a run executes: of an archive, and of this installation.
-_CODE = ("Snakefile", "src", "workflow")
+_CODE = ("src", "workflow")
 _VERSION = re.compile(r'^__version__ = "([0-9A-Za-z.+-]{1,40})"', re.MULTILINE)
 
 _LOG_READ = 1 << 20  # bytes at the end of a log
@@ -75,7 +75,7 @@ class Code(NamedTuple):
     def __str__(self) -> str:
         names = ", ".join(self.other[:SHOWN])
         more = f" and {len(self.other) - SHOWN} more" if len(self.other) > SHOWN else ""
-        has = "" if has_workflow() else "; a package has no Snakefile and no workflow/, a checkout has"
+        has = "" if has_workflow() else "; a package has no workflow/, a checkout has"
         return (
             f"its code says to be stiffdice {self.version}, installed is {__version__}{has}: "
             f"{len(self.other)} of {self.files} files differ: {names}{more}"
@@ -220,7 +220,8 @@ def _checked(archive: str | Path, place: Path) -> tuple[dict[str, str], str]:
         told = ", ".join(sorted(names)) or "none"
         raise RefusedError(f"{archive}: holds results of these studies: {told}; allowed is one")
     (study,) = names
-    for needed in ("Snakefile", "workflow/run.py", "src/stiffdice/__init__.py", f"config/{study}.yaml"):
+    workflow = "Snakefile" if "Snakefile" in listed else "workflow/Snakefile"  # where it was in older archives, and is
+    for needed in (workflow, "workflow/run.py", "src/stiffdice/__init__.py", f"config/{study}.yaml"):
         if needed not in listed:
             raise RefusedError(f"{archive}: has no {needed}; it cannot be made again")
     return listed, study
@@ -246,7 +247,7 @@ def is_code(name: str) -> bool:
 
 def has_workflow() -> bool:
     """Return whether the package lies in a checkout of the project, which has the workflow, too."""
-    return all((PACKAGE.parents[1] / name).is_file() for name in ("Snakefile", "workflow/run.py"))
+    return (PACKAGE.parents[1] / "workflow/run.py").is_file()
 
 
 def compared_code(folder: Path, listed: Mapping[str, str]) -> Code:

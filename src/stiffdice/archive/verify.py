@@ -32,7 +32,6 @@ from stiffdice.study import job_log, outputs
 from stiffdice.sweep.collect import collect
 
 _LARGEST_TEXT = 20_000_000  # bytes of a manifest or a crate's description, of some 30,000 files; as JSON up to 0.5 GB
-_SCHEMA = Path("workflow/schemas/study.schema.yaml")
 # Of a job, under the folder of its study's results.
 # Data that a project came with, and what tries a file of them.
 _MEASUREMENTS, _READER = "config/measurements/", "stiffdice.scene.tosses"
@@ -207,9 +206,9 @@ def _check_asked(report: Report, folder: Path, files: Mapping[str, Path]) -> Non
     """Check a study's results against what it asks now, in the project's folder."""
     name = folder.resolve().name
     try:
-        if not _SCHEMA.is_file() or folder.resolve() != Path("results", name).resolve():
+        if not Path(f"config/{name}.yaml").is_file() or folder.resolve() != Path("results", name).resolve():
             raise InputError("this is not its project's folder")
-        stale = outputs.stale(outputs.asked(studies.load(f"config/{name}.yaml", _SCHEMA)), folder)
+        stale = outputs.stale(outputs.asked(studies.load(f"config/{name}.yaml")), folder)
     except InputError as error:
         report.note(f"whether a study asks for these results ({error})")
         _check_made(report, folder, files)

@@ -55,7 +55,7 @@ _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius",
 def add(advise: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     told = "the physical problem; without it, the options below"
-    advise.add_argument("scene", metavar="SCENE.yaml", nargs="?", help=told)
+    advise.add_argument("scene", metavar="SCENE.yaml", nargs="?", type=common.scene_file, help=told)
     told = "as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
     advise.add_argument("--error", default="1%", metavar="X", help=told)
     told = "path, or landing: the faces of a die (default: path)"

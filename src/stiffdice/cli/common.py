@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,9 +17,10 @@ from stiffdice.scene import validation
 if TYPE_CHECKING:
     from stiffdice.study.config import Study
 
-SCHEMA = "workflow/schemas/study.schema.yaml"
 # Of a duration over a step size: as near as this to a whole number of steps is rounding.
 _WHOLE = 1e-12
+# The scenes of config/scenes, in the package.
+SCENES = Path(validation.__file__).with_name("shipped")
 
 
 def whole(option: str, text: str, *, at_least: int = 1) -> int:
@@ -53,6 +56,26 @@ def steps_of(text: str, duration: float) -> tuple[int, str]:
     return steps, f"{count} of {duration / steps:.9g} s: {asked:g} s does not divide the duration, {duration:g} s"
 
 
+def scene_file(text: str) -> str:
+    """Return the file of a scene; of one that is not there, the one that comes with the package, and say so.
+
+    That is named as `figure-09`, or as in a checkout, config/scenes/figure-09.yaml. For argparse: raises
+    ArgumentTypeError for a bare name that is neither.
+    """
+    if Path(text).exists():
+        return text
+    name = text.removeprefix("config/scenes/").removesuffix(".yaml")
+    shipped = SCENES / f"{name}.yaml"
+    if "/" not in name and shipped.is_file():
+        print(f"stiffdice: note: {text}: no file here; taken is {name}, which comes with stiffdice", file=sys.stderr)
+        return str(shipped)
+    if re.fullmatch("[a-z0-9-]+", text):
+        names = sorted(path.stem for path in SCENES.glob("*.yaml"))
+        told = f"{text}: no such file; scenes that come with stiffdice are {', '.join(names)}"
+        raise argparse.ArgumentTypeError(f"{told}{validation.meant(text, names)}")
+    return text
+
+
 def add_changes(command: argparse.ArgumentParser) -> None:
     """Add the options that change a scene, the same for all commands that take one."""
     command.add_argument("--preset", metavar="P", help="as_listed, as_written or corrected: defaults of the physics")
@@ -65,7 +88,9 @@ def add_changes(command: argparse.ArgumentParser) -> None:
 def scene_words(options: argparse.Namespace, changes: Sequence[str]) -> list[str]:
     """Return the arguments that name the same scene to another command, with changes as `key.path=value`."""
     preset = [] if options.preset is None else ["--preset", options.preset]
-    return [options.scene, *preset, *(word for change in changes for word in ("--set", change))]
+    path = Path(options.scene)
+    scene = path.stem if path.parent == SCENES else options.scene
+    return [scene, *preset, *(word for change in changes for word in ("--set", change))]
 
 
 def _change(text: str) -> str:
@@ -77,9 +102,9 @@ def _change(text: str) -> str:
 
 
 def check_folder() -> None:
-    """Raise InputError unless this is the project's folder."""
-    if not Path(SCHEMA).is_file():
-        raise InputError(f"{SCHEMA}: No such file; call this in the project's folder")
+    """Raise InputError unless this is a project's folder, a checkout or one that uses its workflow as a module."""
+    if not Path("config").is_dir():
+        raise InputError("config/: No such folder; call this in the project's folder, which has config/ and results/")
 
 
 def study_of(name: str) -> Study:
@@ -89,7 +114,7 @@ def study_of(name: str) -> Study:
     check_folder()
     if not config.NAME.fullmatch(name):
         raise InputError(f"STUDY = {name}: allowed is the name of a file in config/, without .yaml")
-    return config.load(f"config/{name}.yaml", SCHEMA)
+    return config.load(f"config/{name}.yaml")
 
 
 def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources: str) -> Path:

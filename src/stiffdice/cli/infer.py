@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-
-from stiffdice.errors import InputError
 
 HELP = "say what shape and centre of mass a die has, from how often its faces came up"
 EXAMPLES = """\
@@ -16,19 +13,16 @@ examples:
 
 The file has `counts: [n1, n2, n3, n4, n5, n6]`, how often the faces 1 to 6 came up, and may have `source` and `note`.
 Opposite faces sum to seven. What shape and load do to the faces is known from simulated throws: the numbers are in
-config/dice/response.yaml, with their errors, by ground and by way of throwing; the answer takes all as equally likely.
+the package, with their errors, by ground and by way of throwing; the answer takes all as equally likely. In a checkout
 `make shapes` computes them anew; --response takes files of yours (docs/how-to/dice-rolls.md).
 Exit status: 0; 2 for bad input.
 """
-
-# Where the numbers are, in the project's folder.
-RESPONSE = "config/dice/response.yaml"
 
 
 def add(infer: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     infer.add_argument("counts", metavar="COUNTS.yaml", help="how often each face came up")
-    told = f"of the experiment face-response; may be given more than once (default: {RESPONSE})"
+    told = "of the experiment face-response; may be given more than once (default: what comes with stiffdice)"
     infer.add_argument("--response", metavar="FILE.h5", action="append", default=[], help=told)
     told = "of a die of which is known how it was thrown: dropped, tossed or rolled (default: all are possible)"
     infer.add_argument("--throw", metavar="NAME", help=told)
@@ -44,10 +38,8 @@ def call(options: argparse.Namespace) -> int:
     given = rolls.load(options.counts)
     if options.response:
         tables, origin = response_table.measured(options.response), ", ".join(options.response)
-    elif not Path(RESPONSE).is_file():
-        raise InputError(f"{RESPONSE}: No such file; call this in the project's folder, or with --response FILE.h5")
     else:
-        tables, origin = response_table.load(RESPONSE), f"{RESPONSE} (make shapes)"
+        tables, origin = response_table.load(response_table.SHIPPED), "what comes with stiffdice (make shapes)"
     if options.throw is not None:
         validation.choice("--throw", options.throw, [table.throw for table in tables])
         tables = [table for table in tables if table.throw == options.throw]

@@ -34,7 +34,8 @@ _DPI = 120  # of an animation
 
 def add(run: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; docs/reference/scene.md lists its keys")
+    told = "the physical problem (docs/reference/scene.md lists its keys), or figure-01 to figure-13 of the paper by name"
+    run.add_argument("scene", metavar="SCENE.yaml", type=common.scene_file, help=told)
     run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
     told = (
         "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling); "

@@ -33,7 +33,8 @@ faces sum to seven. Every throw of a seed is the same again. Exit status: 0 when
 
 def add(command: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    command.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="the die and the ground (default: a 16 mm die)")
+    told = "the die and the ground (default: a 16 mm die)"
+    command.add_argument("scene", nargs="?", metavar="SCENE.yaml", type=common.scene_file, help=told)
     command.add_argument("--count", default="1", metavar="N", help="number of throws (default: 1)")
     command.add_argument("--seed", default="0", metavar="S", help="of the random launches (default: 0)")
     told = "uniform: over all rotations; as_launched: the scene's (default: uniform)"

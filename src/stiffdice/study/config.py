@@ -105,10 +105,11 @@ class Study:
 
 
 NAME = re.compile("[A-Za-z0-9][A-Za-z0-9_-]*")
+_SCHEMA = Path(__file__).with_name("study.schema.yaml")
 
 
-def load(path: str | Path, schema: str | Path) -> Study:
-    """Return the study in a YAML file, checked against the JSON schema in another and with its scenes read.
+def load(path: str | Path) -> Study:
+    """Return the study in a YAML file, checked against the JSON schema beside this file and with its scenes read.
 
     Raises InputError naming the file, the key, the value and what is allowed.
     """
@@ -120,7 +121,7 @@ def load(path: str | Path, schema: str | Path) -> Study:
         told = f"those in {above}/ are {', '.join(there)}" if there else f"{above}/ has none"
         raise InputError(f"{path}: there is no study {name}; {told}{validation.meant(name, there)}")
     data = yaml_loader.load(path)
-    _check(data, yaml_loader.load(schema), str(path))
+    _check(data, yaml_loader.load(_SCHEMA), str(path))
     try:
         tolerances_of("sliding", data.get("criteria"))  # a wrong name is told though no sweep may ask it
         left_out: list[str] = []

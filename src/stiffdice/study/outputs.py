@@ -152,9 +152,10 @@ class Asked(NamedTuple):
 
 
 def asked(study: Study, root: Path = Path()) -> dict[Result, Asked]:
-    """Return what is asked of each result; root: the project, which has the scenes, and scripts that count as code.
+    """Return what is asked of each result.
 
-    A shard has no inputs: its name is a digest of what it holds or, in a later round, of what that follows from.
+    root: the project, which has the scenes, and in a checkout the scripts, which count as code. A shard has no inputs:
+    its name is a digest of what it holds or, in a later round, of what that follows from.
     """
     found: dict[Result, Asked] = {}
     for result, below in needs(study).items():
@@ -233,7 +234,9 @@ def _code(root: Path, stage: str, *modules: str) -> str:
     script, *always = _CODE[stage]
     digest = hashlib.sha256(code_digest(*always, *modules).encode())
     for name in (script, *_SCRIPTS):
-        digest.update((root / "workflow" / "scripts" / name).read_bytes())
+        path = root / "workflow" / "scripts" / name
+        if path.is_file():  # not in a project that uses the workflow as a module: Snakemake sees by itself what changes
+            digest.update(path.read_bytes())
     return digest.hexdigest()[:_DIGITS]
 
 

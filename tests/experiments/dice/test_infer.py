@@ -13,7 +13,7 @@ from stiffdice.experiments.dice.response_table import Table
 from stiffdice.experiments.dice.rolls import Rolls, load
 
 ROOT = Path(__file__).parents[3]
-SHIPPED = response_table.load(ROOT / "config/dice/response.yaml")
+SHIPPED = response_table.load(response_table.SHIPPED)
 LABBY, RED, WHITE = (
     load(ROOT / f"config/measurements/{name}.yaml") for name in ("labby-2009", "wolf-red", "wolf-white")
 )

@@ -17,7 +17,7 @@ from stiffdice.scene import scene as scenes
 
 ROOT = Path(__file__).parents[3]
 SCENE = scenes.load(ROOT / "config/scenes/thrown-die.yaml")
-TABLES = {table.throw: table for table in response_table.load(ROOT / "config/dice/response.yaml")}
+TABLES = {table.throw: table for table in response_table.load(response_table.SHIPPED)}
 GROUND = (0.45, 0.2)
 
 pytestmark = pytest.mark.long

@@ -1,6 +1,6 @@
 """The response of a die's faces to shape and load as numbers: measured before, by ground and by way of throwing.
 
-From a facts file (config/dice/response.yaml), or from files of the experiment `face-response`.
+From a facts file, of which one comes with the package, or from files of the experiment `face-response`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from stiffdice.errors import InputError
 from stiffdice.experiments.dice.axes import Array
 from stiffdice.io import reader, yaml_loader
 from stiffdice.scene import validation
+
+# What `make shapes` gave.
+SHIPPED = Path(__file__).with_name("response.yaml")
 
 COEFFICIENTS = ("chi", "curvature", "psi")
 _GRIDS = tuple(name for coefficient in COEFFICIENTS for name in (coefficient, f"{coefficient}_error"))
