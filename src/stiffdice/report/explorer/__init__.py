@@ -1,0 +1,1 @@
+"""One HTML page on which the stored studies are explored."""
