@@ -101,7 +101,7 @@ types: install  ## check types (mypy)
 
 check: lint types test  ## all of the above
 
-docs: install  ## write docs/api.md from the docstrings of the public names, the tables of docs/FORMAT.md from the schema
+docs: install  ## write docs/reference/api.md from the docstrings of the public names, the tables of docs/reference/FORMAT.md from the schema
 	@$(BIN)/python docs/make_api.py && $(BIN)/python docs/make_format.py
 
 lock: install  ## renew the lock files from requirements/*.in (needs uv on the PATH)

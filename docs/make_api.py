@@ -1,4 +1,4 @@
-"""Write docs/api.md from the docstrings of the public names: `make docs`."""
+"""Write docs/reference/api.md from the docstrings of the public names: `make docs`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import stiffdice
 
-PAGE = Path(__file__).with_name("api.md")
+PAGE = Path(__file__).with_name("reference") / "api.md"
 WIDTH = 100  # of a line of prose and of code
 
 _INTRODUCTION = """\
@@ -25,7 +25,7 @@ on this page, their parameters and their fields stay as they are within a minor 
 
 
 def page() -> str:
-    """Return the text of docs/api.md."""
+    """Return the text of docs/reference/api.md."""
     parts = [_INTRODUCTION, stiffdice.__doc__ or ""]
     for name in stiffdice.__all__:
         parts += [f"## {name}", *_section(name, getattr(stiffdice, name))]

@@ -1,4 +1,4 @@
-"""Write the tables of docs/FORMAT.md from `stiffdice.io.schema`: `make docs`."""
+"""Write the tables of docs/reference/FORMAT.md from `stiffdice.io.schema`: `make docs`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from stiffdice.io import schema
 
-PAGE = Path(__file__).with_name("FORMAT.md")
+PAGE = Path(__file__).with_name("reference") / "FORMAT.md"
 
 _TABLE = r"\| {first} \|.*\n(?:\|.*\n)+"
 _ATTRIBUTES = "| attribute | type |  | what |\n| -- | -- | -- | -- |\n"

@@ -27,38 +27,38 @@ PAGES = [
     "README.md",
     "config/README.md",
     "results/README.md",
-    "docs/house.md",
-    "docs/api.md",
-    "docs/method.md",
-    "docs/advice.md",
-    "docs/ground.md",
-    "docs/check.md",
-    "docs/speed.md",
-    "docs/stability.md",
-    "docs/tradeoff.md",
-    "docs/engines.md",
-    "docs/pair.md",
-    "docs/pair-engines.md",
-    "docs/engines-dart.md",
-    "docs/engines-drake.md",
-    "docs/engines-mujoco-pybullet.md",
-    "docs/granular.md",
-    "docs/FORMAT.md",
-    "docs/archive.md",
-    "docs/verify.md",
-    "docs/diff.md",
-    "docs/status.md",
-    "docs/robustness.md",
-    "docs/trust.md",
-    "docs/slurm.md",
-    "docs/scale.md",
-    "docs/cost.md",
-    "docs/refinement.md",
-    "docs/pair-limits.md",
-    "docs/dice.md",
-    "docs/dice-shapes.md",
-    "docs/dice-rolls.md",
-    "docs/tosses.md",
+    "docs/reference/house.md",
+    "docs/reference/api.md",
+    "docs/explanation/method.md",
+    "docs/how-to/advice.md",
+    "docs/how-to/ground.md",
+    "docs/how-to/check.md",
+    "docs/explanation/speed.md",
+    "docs/explanation/stability.md",
+    "docs/explanation/tradeoff.md",
+    "docs/explanation/engines.md",
+    "docs/explanation/pair.md",
+    "docs/explanation/pair-engines.md",
+    "docs/explanation/engines-dart.md",
+    "docs/explanation/engines-drake.md",
+    "docs/explanation/engines-mujoco-pybullet.md",
+    "docs/explanation/granular.md",
+    "docs/reference/FORMAT.md",
+    "docs/how-to/archive.md",
+    "docs/how-to/verify.md",
+    "docs/how-to/diff.md",
+    "docs/how-to/status.md",
+    "docs/how-to/robustness.md",
+    "docs/reference/trust.md",
+    "docs/how-to/slurm.md",
+    "docs/explanation/scale.md",
+    "docs/explanation/cost.md",
+    "docs/explanation/refinement.md",
+    "docs/explanation/pair-limits.md",
+    "docs/explanation/dice.md",
+    "docs/explanation/dice-shapes.md",
+    "docs/how-to/dice-rolls.md",
+    "docs/explanation/tosses.md",
     "CHANGELOG.md",
 ]
 
@@ -156,7 +156,7 @@ def test_the_tables_of_what_a_study_asks_for_name_all_that_there_is():
 def test_every_scheme_is_explained(capsys):
     rows = [row[0] for row in table_keys("config/README.md", "Study")]
     assert [name for name in rows if name.strip("`") in SCHEMES] == [f"`{name}`" for name in SCHEMES]
-    assert all(f"`{name}`" in (ROOT / "docs/method.md").read_text() for name in SCHEMES)
+    assert all(f"`{name}`" in (ROOT / "docs/explanation/method.md").read_text() for name in SCHEMES)
     with pytest.raises(SystemExit):
         main(["run", "--help"])
     told = capsys.readouterr().out
@@ -164,7 +164,7 @@ def test_every_scheme_is_explained(capsys):
 
 
 def test_every_engine_is_explained(capsys):
-    for page, heading in (("docs/engines.md", "Engines"), ("config/README.md", "Study")):
+    for page, heading in (("docs/explanation/engines.md", "Engines"), ("config/README.md", "Study")):
         told = " ".join(row[0] for row in table_keys(page, heading))
         assert all(f"`{name}`" in told for name in ENGINES), page
     with pytest.raises(SystemExit):
@@ -206,7 +206,9 @@ def without_times(output: str) -> tuple[list[str], set[tuple[str, ...]]]:
 def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
     """But for times, which are another machine's."""
     monkeypatch.chdir(ROOT)
-    examples = [example for page in ("README.md", "docs/advice.md") for example in shown((ROOT / page).read_text())]
+    examples = [
+        example for page in ("README.md", "docs/how-to/advice.md") for example in shown((ROOT / page).read_text())
+    ]
     assert examples
     for arguments, output in examples:
         assert main(arguments) == 0
@@ -216,7 +218,7 @@ def test_the_advice_that_is_shown_is_what_advise_says(capsys, monkeypatch):
 def grounds() -> list[tuple[list[str], list[str]]]:
     """Return the arguments of each `ground` that a page shows, and the lines of its output that are shown."""
     example = r"^```sh\nstiffdice (ground [^\n]*)\n```\n\n```text\n(.*?)^```"
-    blocks = re.findall(example, (ROOT / "docs/ground.md").read_text(), re.MULTILINE | re.DOTALL)
+    blocks = re.findall(example, (ROOT / "docs/how-to/ground.md").read_text(), re.MULTILINE | re.DOTALL)
     return [(shlex.split(command), output.splitlines()) for command, output in blocks]
 
 

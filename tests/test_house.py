@@ -1,4 +1,4 @@
-"""docs/house.md is true: it draws the packages that there are, and what it says adds a thing does add it."""
+"""docs/reference/house.md is true: it draws the packages that there are, and what it says adds a thing does add it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stiffdice.simulation.run import simulate
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "stiffdice"
-PAGE = (ROOT / "docs" / "house.md").read_text()
+PAGE = (ROOT / "docs/reference/house.md").read_text()
 
 
 def test_the_page_draws_the_packages_in_the_order_of_their_imports():

@@ -16,7 +16,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 # A sacct that answers what the plugin understands; see there.
 SACCT = Path(__file__).parent / "profiles" / "slurm" / "bin"
 PATIENCE = 60  # seconds that Slurm may take to answer
-HOW = "see docs/slurm.md"
+HOW = "see docs/how-to/slurm.md"
 # Of default-resources, those that Slurm may refuse whatever the job.
 KEYS = {"slurm_account": "account", "slurm_partition": "partition", "qos": "qos", "constraint": "constraint"}
 

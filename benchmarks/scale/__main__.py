@@ -11,7 +11,7 @@ from stiffdice.errors import StiffdiceError
 
 EXAMPLES = """\
 examples:
-  python -m benchmarks.scale                                 what docs/scale.md shows; half an hour
+  python -m benchmarks.scale                                 what docs/explanation/scale.md shows; half an hour
   python -m benchmarks.scale --runs 1e4 --workers 0 --extend 0                one size, and nothing else
   python -m benchmarks.scale --study config/my-sweep.yaml --runs 1e5 1e6      how a sweep of one's own grows
 

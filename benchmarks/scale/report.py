@@ -1,4 +1,4 @@
-"""What was measured as a page of Markdown, and as a table for programs; the page is what docs/scale.md shows."""
+"""What was measured as a page of Markdown, and as a table for programs; the page is in docs/explanation/scale.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Our files keep the CF conventions, by the checker of the IOOS; what it finds and we mean so is in docs/FORMAT.md."""
+"""Our files keep the CF conventions, by the checker of the IOOS; findings that we mean so: docs/reference/FORMAT.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written is as the format says, and docs/FORMAT.md says the same."""
+"""What is written is as the format says, and docs/reference/FORMAT.md says the same."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stiffdice.io.reader import open_file
 from stiffdice.io.structure_check import FORMAT_VERSION
 
 STORED = Path(__file__).parents[1] / "reference" / "formats" / FORMAT_VERSION
-PAGE = Path(__file__).parents[2] / "docs" / "FORMAT.md"
+PAGE = Path(__file__).parents[2] / "docs/reference/FORMAT.md"
 
 
 @pytest.mark.parametrize("kind", ["run", "pair", "shard", "sweep", "frontier", "experiment"])
@@ -30,7 +30,7 @@ def test_what_is_written_is_as_the_format_says(written, kind):
 
 def test_the_page_is_up_to_date():
     """`make docs` writes its tables."""
-    make_format = runpy.run_path(str(PAGE.with_name("make_format.py")))
+    make_format = runpy.run_path(str(PAGE.parents[1] / "make_format.py"))
     assert make_format["page"](PAGE.read_text(encoding="utf-8")) == PAGE.read_text(encoding="utf-8")
 
 

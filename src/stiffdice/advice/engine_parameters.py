@@ -1,14 +1,14 @@
 """A contact in the words of other engines: what to paste so that a box bounces on a plane as ours does on its ground.
 
-MuJoCo asks for an acceleration a_ref = −b v − k r of each contact (docs/engines-mujoco-pybullet.md) and gets it but for
-an impedance d < 1. The four contacts of a box on its face, of a regulariser (1 − d)/d each, are accelerated by
-4d/(1 + 3d) of a_ref; MuJoCo divides k by d and b by one of its d. So ω² = 4S/m and 2ζω = 4D/m want, in the direct form,
-solref = −(S, D)(1 + 3d)/m, and in the other, with k = 1/(d τ ζ')² and b = 2/(d τ), the time constant
-τ = 4/((1 + 3d) ζω) and the damping ratio ζ' = ζ √(1 + 3d)/2. Gravity acts with (1 − d)/(1 + 3d) of itself in contact.
+MuJoCo asks for an acceleration a_ref = −b v − k r of each contact (docs/explanation/engines-mujoco-pybullet.md) and
+gets it but for an impedance d < 1. The four contacts of a box on its face, of a regulariser (1 − d)/d each, are
+accelerated by 4d/(1 + 3d) of a_ref; MuJoCo divides k by d and b by one of its d. So ω² = 4S/m and 2ζω = 4D/m want, in
+the direct form, solref = −(S, D)(1 + 3d)/m, and in the other, with k = 1/(d τ ζ')² and b = 2/(d τ), the time constant τ
+= 4/((1 + 3d) ζω) and the damping ratio ζ' = ζ √(1 + 3d)/2. Gravity acts with (1 − d)/(1 + 3d) of itself in contact.
 
 PyBullet and Drake have a spring and a dashpot at a contact. Both take a step by implicit Euler, which damps by itself
-like a further dashpot S h (docs/engines-drake.md): a damping of D − S h makes up for it. Drake's compliant half space
-of a slab of H has the pressure E x/H, over a face of side s the force E s² x/H: E = 4 S H/s².
+like a further dashpot S h (docs/explanation/engines-drake.md): a damping of D − S h makes up for it. Drake's compliant
+half space of a slab of H has the pressure E x/H, over a face of side s the force E s² x/H: E = 4 S H/s².
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A scheme of fixed steps: how many steps an error takes.
 
 The scheme is tried with more and more steps, as far as a budget goes; what is beyond that is extrapolated by its order
-under contact, which is one wherever a force sets in with a jump (docs/method.md). A run that was ended early, or is too
-far off to say anything, is known until then only; from there on its error is taken to grow as one of the pilot's
-tolerance does, or as the square of time if that is more.
+under contact, which is one wherever a force sets in with a jump (docs/explanation/method.md). A run that was ended
+early, or is too far off to say anything, is known until then only; from there on its error is taken to grow as one of
+the pilot's tolerance does, or as the square of time if that is more.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class Search(NamedTuple):
         worst = max(end * float(trial.steps) ** order for trial, end in known)
         wanted = (_FAR_SAFETY * worst / asked) ** (1 / order)
         evidence = (
-            f"extrapolated by order {order} under contact (docs/method.md) from runs of "
+            f"extrapolated by order {order} under contact (docs/explanation/method.md) from runs of "
             f"{known[0][0].steps:.3g} to {known[-1][0].steps:.3g} steps"
         )
         if wanted >= _MOST_STEPS:

@@ -13,7 +13,8 @@ from stiffdice.scene.scene import Scene
 from stiffdice.simulation.landing import BATCHED, MODEL, faces_of
 
 # By total variation: the part of the linear stability limit up to which the faces' distribution is within it, with a
-# margin. `make landing` found that it grows in proportion to steps, to 0.0033 at 0.4 of the limit (docs/dice.md).
+# margin. `make landing` found that it grows in proportion to steps, to 0.0033 at 0.4 of the limit
+# (docs/explanation/dice.md).
 LONGEST = {0.003: 0.3, 0.001: 0.1}
 
 
@@ -43,7 +44,7 @@ class LandingAdvice:
             f"steps     {self.steps} to {duration:g} s, at most: a throw ends as soon as its face is decided",
             f"error     at most {self.error:g} of total variation of the faces' distribution; single paths are lost",
             f"evidence  ωh = {self.omega_h:.2g} of the fastest contact ({self.contact}), {self.part:.0%} of its linear "
-            "limit; docs/dice.md has the scan",
+            "limit; docs/explanation/dice.md has the scan",
         ]
 
 

@@ -51,7 +51,7 @@ MATERIALS = {
         0.115,
         "0.04 to 0.16",
         "thrown by hand",
-        "fitted to tosses of Pfrommer, Halm and Posa 2020, arXiv:2009.11193 (docs/tosses.md)",
+        "fitted to tosses of Pfrommer, Halm and Posa 2020, arXiv:2009.11193 (docs/explanation/tosses.md)",
     ),
 }
 

@@ -33,7 +33,8 @@ _SLOW, _DEAR = 0.3, 1_000_000
 # Schemes that take steps of their own, so that the advised run is one that was made.
 _OWN = ("exact", "event")
 
-# What the advice was tried on (docs/advice.md): stiffness for the paper's cube, and damping ratio of a flat landing.
+# What the advice was tried on (docs/how-to/advice.md): stiffness for the paper's cube, and damping ratio of a flat
+# landing.
 STUDIED_STIFFNESS = 1e2, 1e12
 STUDIED_ZETA = 0.5
 STUDIED_LANDINGS = 30

@@ -3,7 +3,7 @@
 The linear limit is theory's (`linear_stability`), of the fastest contact of a cube that turns. No theory knows the rest
 for a damped contact: flat bounces are measured, without gravity, with longer and longer steps, each met by the ground
 at several phases of a step. A limit is the longest of these steps up to which none failed: as contact switches on and
-off, longer ones may pass again (docs/stability.md).
+off, longer ones may pass again (docs/explanation/stability.md).
 """
 
 from __future__ import annotations

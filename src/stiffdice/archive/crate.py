@@ -191,7 +191,7 @@ def page(facts: Facts) -> str:
     paths = ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME]
     for file in facts.files:
         is_data = file.result is not None and file.result.stage not in {"shard", "figure", "animation"}
-        if is_data or file.kind == REPORT or file.path == "docs/FORMAT.md":
+        if is_data or file.kind == REPORT or file.path == "docs/reference/FORMAT.md":
             paths.append(file.path)
     return template.render(facts=facts, paths=paths, manifest=manifest.NAME)
 

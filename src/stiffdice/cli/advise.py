@@ -24,10 +24,11 @@ examples:
 
 The error is the root mean square distance of the cube's centre from the exact path until the end (or the horizon), in
 radii of the cube: 1% of a 1 m cube is 1 cm. A path that is chaotic may be known for a part of the duration only; the
-advice is then for that part (docs/advice.md). It takes about ten seconds; the first on a machine compiles, which may
-take a minute. With --for landing the error is that of the faces' distribution, as total variation, and the advice is
-for `stiffdice throw` (docs/dice.md). Where there is no SCENE.yaml, keys not given have the paper's values. Exit status:
-0 for an advice, with --run for a promise kept; 1 if nothing keeps the error or the promise is broken; 2 for bad input.
+advice is then for that part (docs/how-to/advice.md). It takes about ten seconds; the first on a machine compiles, which
+may take a minute. With --for landing the error is that of the faces' distribution, as total variation, and the advice
+is for `stiffdice throw` (docs/explanation/dice.md). Where there is no SCENE.yaml, keys not given have the paper's
+values. Exit status: 0 for an advice, with --run for a promise kept; 1 if nothing keeps the error or the promise is
+broken; 2 for bad input.
 """
 
 # Keys of the scene that `advise` has an option for, and what they are.

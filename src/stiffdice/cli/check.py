@@ -18,8 +18,8 @@ examples:
 
 Every free body lands on the floor, and on other bodies that the model lets it touch, in MuJoCo, by the model's own
 options, at the speed of a drop from its own size. Beside it stands what its solref, solimp and inertia predict. MuJoCo
-is of `make install-engines`. docs/check.md says what the numbers and the verdicts mean. Exit status: 0 if nothing is
-wrong, 1 for a verdict, 2 for what cannot be checked.
+is of `make install-engines`. docs/how-to/check.md says what the numbers and the verdicts mean. Exit status: 0 if
+nothing is wrong, 1 for a verdict, 2 for what cannot be checked.
 """
 
 

@@ -16,7 +16,7 @@ examples:
   stiffdice diff before results/quick --json
 
 The exit status is 0 if both say the same, 1 if they differ, 2 if they cannot be compared. Logs, times, and what shows
-times differ from one rebuild to the next; they are left out, unless --all is given. docs/diff.md says more.
+times differ from one rebuild to the next; they are left out, unless --all is given. docs/how-to/diff.md says more.
 """
 
 

@@ -24,7 +24,7 @@ examples:
 A ground is told by how it bounces (--restitution, --material or --damping) and by how hard it is (--depth,
 --contact-time or --stiffness), of a cube that lands flat. What is printed after `ground:` can be pasted into a scene.
 Longest steps are measured in some seconds; --quick leaves them out. --engine adds what to paste into an engine, the
-restitution predicted at each timestep and, where the engine is installed, measured (docs/ground.md).
+restitution predicted at each timestep and, where the engine is installed, measured (docs/how-to/ground.md).
 """
 
 # Options that are numbers: what they are, and their unit.

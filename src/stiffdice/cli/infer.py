@@ -17,7 +17,7 @@ examples:
 The file has `counts: [n1, n2, n3, n4, n5, n6]`, how often the faces 1 to 6 came up, and may have `source` and `note`.
 Opposite faces sum to seven. What shape and load do to the faces is known from simulated throws: the numbers are in
 config/dice/response.yaml, with their errors, by ground and by way of throwing; the answer takes all as equally likely.
-`make shapes` computes them anew; --response takes files of yours (docs/dice-rolls.md).
+`make shapes` computes them anew; --response takes files of yours (docs/how-to/dice-rolls.md).
 Exit status: 0; 2 for bad input.
 """
 

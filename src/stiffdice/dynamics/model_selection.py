@@ -8,9 +8,9 @@ A model leaves something out, and is exact where that would do nothing:
   those four alone;
 - friction and the place on the ground (`vertical`), where nothing moves the cube along level ground.
 
-Exact is meant of the motion, not of round-off, which the full model may amplify (docs/method.md). A flat cube whose
-centre stays above the ground is righted by every contact. On an edge or a corner, or with its centre below the ground,
-the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
+Exact is meant of the motion, not of round-off, which the full model may amplify (docs/explanation/method.md). A flat
+cube whose centre stays above the ground is righted by every contact. On an edge or a corner, or with its centre below
+the ground, the ground turns it further from the slightest tilt, so that no model without rotation stands for it.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 An undamped cube without friction comes down flat on a `gated` ground, without gravity, and leaves it again: the contact
 law gives back what it took, e² = 1, and all that differs is the time step's. Its largest gain is
 `linear_theory.largest_gain`, at phase 0, its largest loss takes e² to the inverse, and at the magic steps there is none
-(docs/stability.md). Gravity makes a contact longer than half a period, and at a magic step e² is off by up to 2gh/v, v
-being the speed at the ground: measured a second time, with the scene's gravity, at the speed with which the scene's
-launch meets it.
+(docs/explanation/stability.md). Gravity makes a contact longer than half a period, and at a magic step e² is off by up
+to 2gh/v, v being the speed at the ground: measured a second time, with the scene's gravity, at the speed with which the
+scene's launch meets it.
 """
 
 from __future__ import annotations

@@ -51,10 +51,10 @@ def plain_file(path: str | Path) -> PlainDataset:
 def open_results(path: str | PathLike[str]) -> xr.Dataset:
     """Return the dataset in a file of stiffdice, loaded, with enums as words: `sel(contact="gated")`, `sel(axis="z")`.
 
-    path: of a file of any kind (docs/FORMAT.md says dimensions and units). `xarray.open_dataset` opens the same file
-    with the enums as the numbers that are stored.
+    path: of a file of any kind (docs/reference/FORMAT.md says dimensions and units). `xarray.open_dataset` opens the
+    same file with the enums as the numbers that are stored.
 
-    Raises InputError, naming the file, if it cannot be read or trusted (docs/trust.md).
+    Raises InputError, naming the file, if it cannot be read or trusted (docs/reference/trust.md).
     """
     name = str(path)
     isolation.admit(name)

@@ -1,5 +1,5 @@
 """The format of our files as tables. From them follow the layout of written files, the check of read ones
-(`problems`), and the tables of docs/FORMAT.md (`make docs`).
+(`problems`), and the tables of docs/reference/FORMAT.md (`make docs`).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ COORDINATE, ENUM, LABELS = "coordinate", "enum", "coordinate, enum"
 
 
 class Attribute(NamedTuple):
-    """A global attribute. what: it says, for docs/FORMAT.md. type: TEXT, WHOLE or NUMBER."""
+    """A global attribute. what: it says, for docs/reference/FORMAT.md. type: TEXT, WHOLE or NUMBER."""
 
     what: str
     need: str = REQUIRED
@@ -35,7 +35,7 @@ class Attribute(NamedTuple):
 class Variable(NamedTuple):
     """A variable. type: as NumPy writes it without byte order. role: COORDINATE, ENUM, LABELS (both) or none.
 
-    note: what docs/FORMAT.md adds to the long_name. since: version of the format from which on it is there.
+    note: what docs/reference/FORMAT.md adds to the long_name. since: version of the format from which on it is there.
     """
 
     dimensions: tuple[str, ...]

@@ -123,18 +123,18 @@ def simulate(
     """Run a scene and return the verdict, the measures and, if asked, the trajectory.
 
     scene: the problem. model: vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene.
-    simulator: stiffdice, or an engine that is installed (docs/engines.md), which takes every step, one member after
-    another. scheme: None takes symplectic_euler, or an engine's own. steps: number of time steps to the scene's
-    duration. tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps` are then
-    the intervals after which a state is known. every: keep every K-th state, from the launch on; None keeps none.
-    leap: take many steps at once where their motion is known, which agrees with stepping as listed to round-off; None
-    does so where no state is kept. members: the launches of an ensemble; None runs the scene's own launch. criteria
-    [1]: tolerances of those that the verdict asks, by name; None asks the default ones. stop [1]: end a run as soon as
-    all of these criteria are decided at these tolerances. references: what the criterion trajectory compares with, one
-    for all or one for each member (`reference_run.references`). hop_height [m]: rebounds that stay lower are not judged
-    by the criterion apex; None takes a tenth of the cube's radius. budget: most steps to compute one by one, or about
-    the most force evaluations of a scheme or an engine that takes its own steps; a run that needs more ends undecided;
-    None is all steps, or 10⁷ evaluations. progress: called with the fraction done, some times a second.
+    simulator: stiffdice, or an engine that is installed (docs/explanation/engines.md), which takes every step, one
+    member after another. scheme: None takes symplectic_euler, or an engine's own. steps: number of time steps to the
+    scene's duration. tolerance [1]: of the error, relative to the motion, for a scheme that controls its own; `steps`
+    are then the intervals after which a state is known. every: keep every K-th state, from the launch on; None keeps
+    none. leap: take many steps at once where their motion is known, which agrees with stepping as listed to round-off;
+    None does so where no state is kept. members: the launches of an ensemble; None runs the scene's own launch.
+    criteria [1]: tolerances of those that the verdict asks, by name; None asks the default ones. stop [1]: end a run as
+    soon as all of these criteria are decided at these tolerances. references: what the criterion trajectory compares
+    with, one for all or one for each member (`reference_run.references`). hop_height [m]: rebounds that stay lower are
+    not judged by the criterion apex; None takes a tenth of the cube's radius. budget: most steps to compute one by one,
+    or about the most force evaluations of a scheme or an engine that takes its own steps; a run that needs more ends
+    undecided; None is all steps, or 10⁷ evaluations. progress: called with the fraction done, some times a second.
 
     Raises InputError for an unknown name, a step count or K out of range, a model that the scene, the scheme or the
     engine does not allow, an engine that is not installed, `auto` for an ensemble, and a trajectory too large to hold.

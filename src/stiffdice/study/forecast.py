@@ -3,7 +3,7 @@
 Seconds are of one core of the machine that `cost` is of, otherwise idle; how this one compares, a sum of numbers in a
 row says within a hundredth of a second (`slowness`), and what else runs on it, the system (`crowding`). What `cost`
 does not predict takes as long as was measured once: a table, right as long as the options are as in config/. How good
-it is: `docs/status.md`.
+it is: `docs/how-to/status.md`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""The predicted work of the cells of a sweep, so that jobs get equal shares. `docs/cost.md` derives the formula.
+"""The predicted work of the cells of a sweep, so that jobs get equal shares.
+
+`docs/explanation/cost.md` derives the formula.
 
 A run is followed as a ball that bounces, landing by landing: how long it rises, falls, touches and rests. From this
 follows how many steps are computed one by one. Nothing is simulated.

@@ -1,4 +1,4 @@
-"""What docs/tosses.md says of the real tosses, on all of them that the fit has not seen."""
+"""What docs/explanation/tosses.md says of the real tosses, on all of them that the fit has not seen."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ examples:
 
 The archive is checked first. Its own code, where that is not the installed code, file by file, is run after asking, in
 a sandbox (bubblewrap), or not at all. Exit status: 0 if all data and figures are the same, 1 if some differ, 2 if the
-archive cannot be trusted, is not to be run, or its run failed. docs/verify.md says more.
+archive cannot be trusted, is not to be run, or its run failed. docs/how-to/verify.md says more.
 """
 
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both

@@ -17,7 +17,7 @@ examples:
   stiffdice verify throw.h5 --json
 
 Nothing of an archive is executed. Exit status: 0 if nothing fails, 1 if something fails, 2 if it cannot be read
-at all. docs/verify.md says what is checked, and how to check it without stiffdice.
+at all. docs/how-to/verify.md says what is checked, and how to check it without stiffdice.
 """
 
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import cache
 
 QUIET_SECONDS = 2.0
-# s of one core of docs/speed.md; any other scheme takes about as long as the next.
+# s of one core of docs/explanation/speed.md; any other scheme takes about as long as the next.
 _COMPILING = {"event": 12.0, "two cubes": 8.0}
 
 

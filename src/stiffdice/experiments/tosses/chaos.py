@@ -14,7 +14,7 @@ from stiffdice.experiments.tosses.replay import MODEL, SCHEME, Physics, faces, s
 from stiffdice.scene import die, validation
 from stiffdice.scene.scene import Scene
 
-# Faces are the same at shorter steps but for a toss in a hundred (docs/tosses.md).
+# Faces are the same at shorter steps but for a toss in a hundred (docs/explanation/tosses.md).
 _STEP = 0.1
 
 _FOUND = {

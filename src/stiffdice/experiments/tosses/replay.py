@@ -22,7 +22,7 @@ from stiffdice.simulation.run import simulate
 
 MODEL, SCHEME = "tumbling", "symplectic_euler"
 
-# Steps by which errors against reality are known to a hundredth (docs/tosses.md).
+# Steps by which errors against reality are known to a hundredth (docs/explanation/tosses.md).
 CONVERGED = 0.05
 # A toss is given so long to come to rest [s]: the longest measured one takes 3 s.
 _REST = 4.0

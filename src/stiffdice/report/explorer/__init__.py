@@ -1,1 +1,1 @@
-"""One HTML page on which the stored studies are explored."""
+"""The explorer: one HTML page, published from stored studies, that runs the paper's step in the browser."""

@@ -2,7 +2,7 @@
 
 A step of h [s] presses a node that is below the ground at its beginning with S·depth − D·u_n of the depth and the
 normal velocity at its end, or not at all: the gated law, found a step late and solved by implicit Euler. Of what could
-be chosen, these are the settings nearest to our law (docs/engines.md has what was measured):
+be chosen, these are the settings nearest to our law (docs/explanation/engines.md has what was measured):
 
 - Only this one of Drake's approximations has a linear dashpot, a relaxation time τ = D/S; the others and the continuous
   mode multiply the force by 1 − d·u_n (Hunt and Crossley), which is ours at D = 0 only. In turn its friction is coupled

@@ -258,10 +258,13 @@ function percent(share) {
   return `${Math.round(100 * share)} %`;
 }
 
+/** Show the map of stored sweeps in an element; data: as map_data.collect() in Python returns it. */
 async function mountMap(element, data) {
   if (data.maps.length === 0) {
-    element.textContent = `No sweep is stored that gives a map; ${data.made_by} make some, then publish again.`;
+    element.textContent = `No sweep is stored that gives a map: ${data.made_by} make some; then publish this page again.`;
     return null;
   }
-  return new StabilityMap(element, data, await unpackedBlock(data.block));
+  element.textContent = "Unpacking the stored sweeps …";
+  const [block] = await Promise.all([unpackedBlock(data.block), loadPlotly()]);
+  return new StabilityMap(element, data, block);
 }
