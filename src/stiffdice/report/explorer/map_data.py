@@ -12,7 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from stiffdice.dynamics import linear_theory
-from stiffdice.dynamics.state import TOUCHING, TURNING, States, physics_of
+from stiffdice.dynamics.state import TURNING, States, physics_of
 from stiffdice.errors import InputError, RefusedError
 from stiffdice.integrators import linear_stability
 from stiffdice.io import schema
@@ -38,6 +38,7 @@ STUDIES = ("stability", "paper")
 MADE_BY = "make stability, make paper"
 
 SCHEME = "symplectic_euler"  # that the page computes again
+_RUN_AGAIN = ("sliding", "tumbling")
 # Of a cube that turns, each member has an exact path of its own; so many are published, the first ones. Their launches
 # are spread evenly, however many they are.
 PATHS = 8
@@ -101,8 +102,8 @@ def _map(folder: Path, packer: Packer, paths: _Paths) -> dict[str, Any] | None:
     about, model = sweep.attrs, str(sweep.attrs["model"])
     scene, members = scenes.from_mapping(json.loads(about["scene"])), int(about["members"])
     horizon = float(about["horizon"]) if "horizon" in about else None
-    again = about["simulator"] == OURS and about["scheme"] == SCHEME and model in TOUCHING and not scene.cube.is_box
     launches = turned(scene, model, members)[: members if model in TURNING else 1]
+    again = about["simulator"] == OURS and about["scheme"] == SCHEME and model in _RUN_AGAIN and not scene.cube.is_box
     shown = launches[:PATHS] if again else launches[:0]
     columns = list(_columns(sweep, frontier, scene, model))
     for column in columns:

@@ -73,6 +73,20 @@ class Sweep {
     return known > 1 ? (failing.find((member) => member < known) ?? failing[0]) : failing[0];
   }
 
+  // The criterion about which the members of most cells disagree.
+  mostDisputed() {
+    const disputed = (name) => {
+      let count = 0;
+      for (let cell = 0; cell < this.steps.length; cell += 1) {
+        const share = this.share(name, cell);
+        if (share > 0 && share < 1) count += 1;
+      }
+      return count;
+    };
+    const counts = this.names.map(disputed);
+    return this.names[counts.indexOf(Math.max(...counts))];
+  }
+
   // The number of the exact path of a member, undefined if none is published: all share one unless the cube turns.
   path(cell, member) {
     const { paths } = this.column(cell);

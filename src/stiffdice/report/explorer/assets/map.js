@@ -7,7 +7,7 @@ const MAP_PAGE = `
     <fieldset><legend>Contact law</legend><span data-part="laws"></span></fieldset>
     <fieldset><legend>A member passes if</legend><span data-part="criteria"></span></fieldset>
     <fieldset><legend>Vertical axis</legend>
-      <label><input type="radio" name="axis" value="omega_h" checked> ωh</label>
+      <label><input type="radio" name="axis" value="omega_h" checked> ωh, contact frequency × step size</label>
       <label><input type="radio" name="axis" value="steps"> time steps</label>
     </fieldset>
   </form>
@@ -24,8 +24,9 @@ const MAP_PAGE = `
   </form>
   <p data-part="summary" class="map-summary" aria-live="polite"></p>
   <div data-part="run" hidden>
-    <p><label>Member <select name="member"></select></label> <span data-part="member"></span></p>
+    <p class="map-member"><label>Member <select name="member"></select></label> <span data-part="member"></span></p>
     <p data-part="verdict" class="map-summary" aria-live="polite"></p>
+    <table class="map-outcomes" data-part="outcomes"></table>
     <div data-part="height" class="map-plot"></div>
     <div data-part="energy" class="map-plot"></div>
     <p data-part="caveat" class="map-note"></p>
@@ -35,6 +36,7 @@ const MAP_PAGE = `
 
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const MAGIC = [2, 3, 4, 5, 6]; // whose steps are marked: ωh = 2 sin(π/2n)
+const FIRST_CELL = [1e6, 10000]; // shown at first: stiffness [kg/s²] and steps of the paper's figures 9 and 10
 
 function superscript(number) {
   return String(number).replace(/./g, (sign) => (sign === "-" ? "⁻" : SUPERSCRIPTS[Number(sign)]));
@@ -80,7 +82,8 @@ class StabilityMap {
   }
 
   titleOf(sweep) {
-    return `${sweep.model}: ${sweep.name}, ${sweep.ground}`;
+    const stiffnesses = new Set(sweep.columns.map(({ stiffness }) => stiffness)).size;
+    return `${sweep.model} (results/${sweep.name.replace("/", "/sweeps/")}): ${stiffnesses} stiffnesses`;
   }
 
   options(select, pairs) {
@@ -123,7 +126,7 @@ class StabilityMap {
     const criteria = sweep.criteria.map(({ name, words }) => [name, `${name}: ${words}`]);
     this.sweep = sweep;
     if (!laws.includes(this.law)) this.law = laws[0];
-    if (!sweep.names.includes(this.criterion)) this.criterion = sweep.names[0];
+    if (!sweep.names.includes(this.criterion)) this.criterion = sweep.mostDisputed();
     this.radios(this.part.laws, "law", laws.map((law) => [law, this.data.laws[law]]), this.law);
     this.radios(this.part.criteria, "criterion", criteria, this.criterion);
     this.part.about.textContent =
@@ -132,6 +135,9 @@ class StabilityMap {
       `${sweep.scene.duration} s, symplectic Euler, ${sweep.ground}.`;
     this.cell = null;
     this.refresh();
+    const [stiffness, steps] = FIRST_CELL, off = (column) => Math.abs(Math.log(column.stiffness / stiffness));
+    const column = sweep.ofLaw(this.law).reduce((best, other) => (off(other) < off(best) ? other : best));
+    this.choose(sweep.nearest(column, steps), true);
   }
 
   // Draw anew after a choice; the chosen stiffness and steps are kept where the other law has them, too.
@@ -180,10 +186,21 @@ class StabilityMap {
         const cell = this.cells[point.curveNumber]?.[point.pointNumber[0]];
         if (cell !== undefined) this.choose(cell, true);
       });
+      this.part.map.on("plotly_relayout", (change) => {
+        if ("yaxis.range[0]" in change || "yaxis.autorange" in change || "yaxis.range" in change) this.tick();
+      });
     }
+    const magic = this.axis === "omega_h" ? " At the right: magic steps ωh = 2 sin(π/2n), at which an undamped bounce keeps its energy." : "";
     this.part.legend.textContent =
-      `Colour: share of the ${this.sweep.members} members that pass. Open marks: first pass, the fewest steps at which ` +
-      "all pass. Full marks: last fail, the most at which one still fails. Dashed: ωh = 2, the linear limit. Right: magic steps.";
+      `○ first pass: the fewest steps at which all ${this.sweep.members} members pass. ▲ last fail: the most at which one ` +
+      `still fails. Dashed: ωh = 2, the linear limit of stability.${magic}`;
+  }
+
+  /** Label what is seen of the axis of ωh after a zoom. */
+  tick() {
+    if (this.axis !== "omega_h") return;
+    const [low, high] = this.part.map.layout.yaxis.range.map((power) => 10 ** power), values = ticksOf(low, high);
+    Plotly.relayout(this.part.map, { "yaxis.tickvals": values, "yaxis.ticktext": values.map(String) });
   }
 
   about(criterion) {
@@ -230,8 +247,8 @@ class StabilityMap {
     this.field.steps.value = String(sweep.steps[cell]);
     this.part.summary.textContent = summaryOf(this, cell);
     this.tables();
-    this.part.run.hidden = !run;
-    if (!run) return;
+    this.part.run.hidden = !run || !sweep.runs_again;
+    if (this.part.run.hidden) return;
     const failing = new Set(sweep.failing(criterion, cell));
     this.options(
       this.field.member,

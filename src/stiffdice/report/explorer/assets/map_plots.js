@@ -11,14 +11,30 @@ function logAxis(title) {
   return { type: "log", title: { text: title }, showgrid: false, ticks: "outside", zeroline: false };
 }
 
+/** Return round numbers between two of a logarithmic axis: 1, 2 and 5 times powers of ten, or finer ones. */
+function ticksOf(low, high) {
+  const found = [];
+  if (high / low > 4) {
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
+      found.push(...[1, 2, 5].map((digit) => Number(`${digit}e${power}`)));
+    }
+  } else {
+    const rough = (high - low) / 6, power = 10 ** Math.floor(Math.log10(rough));
+    const step = power * ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10);
+    for (let k = Math.ceil(low / step); k * step <= high; k += 1) found.push(Number((k * step).toPrecision(6)));
+  }
+  return found.filter((value) => value >= low && value <= high);
+}
+
 function mapLayout(map, columns) {
   const { axis, data, sweep } = map, centres = columns.map(({ stiffness }) => stiffness);
   const magic = axis === "omega_h" ? MAGIC.map((n) => [n, 2 * Math.sin(Math.PI / (2 * n))]) : [];
   const sides = bordersOf(centres), places = map.cells.flat().map((cell) => map.place(cell));
-  const log = (values) => values.map(Math.log10);
+  const log = (values) => values.map(Math.log10), low = Math.min(...places), high = Math.max(...places);
+  const tickvals = ticksOf(low, high);
   return {
     height: isNarrow() ? 420 : 520,
-    margin: { l: 64, r: 44, t: 12, b: 96 },
+    margin: { l: 58, r: 44, t: 12, b: 118 },
     font: PLOT_FONT,
     hovermode: "closest",
     dragmode: isNarrow() ? false : "zoom",
@@ -29,16 +45,16 @@ function mapLayout(map, columns) {
     xaxis: { ...logAxis("stiffness S [kg/s²]"), range: log([sides[0], sides[sides.length - 1]]), exponentformat: "power", dtick: 1 },
     yaxis: {
       ...logAxis(axis === "steps" ? `time steps in ${sweep.scene.duration} s [1]` : "ωh of a flat landing [1]"),
-      range: log([Math.min(...places), Math.max(...places)]),
-      ...(axis === "steps" ? { exponentformat: "power", dtick: 1 } : { dtick: "D2" }),
+      range: log([low, high]),
+      ...(axis === "steps" ? { exponentformat: "power", dtick: 1 } : { tickvals, ticktext: tickvals.map(String) }),
     },
     coloraxis: {
       cmin: 0,
       cmax: 1,
       colorscale: "Cividis",
       colorbar: {
-        orientation: "h", y: -0.36, len: 0.9, thickness: 12, tickformat: ".0%",
-        title: { text: "share of members that pass", side: "bottom" },
+        orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 0.9, thickness: 12, tickformat: ".0%",
+        title: { text: "share of members that pass", side: "top" },
       },
     },
     annotations: magic.map(([n, omegaH]) => ({
@@ -59,8 +75,9 @@ function edgeTraces(map, columns) {
   return [
     { ...look, type: "scatter", mode: "lines", y: limit, line: { color: "white", width: 3.5 } },
     { ...look, type: "scatter", mode: "lines", y: limit, line: { color: data.looks.theory, width: 1.5, dash: "dash" } },
-    marks("last_fail", { size: 8, color, line: { color: "white", width: 1.5 }, symbol: "triangle-up" }),
-    marks("first_pass", { size: 9, color: "white", line: { color, width: 2.5 }, symbol: "circle" }),
+    marks("last_fail", { size: 11, color, line: { color: "white", width: 1.5 }, symbol: "triangle-up" }),
+    marks("first_pass", { size: 13, color: "white", line: { width: 6 }, symbol: "circle-open" }),
+    marks("first_pass", { size: 13, color, line: { width: 3 }, symbol: "circle-open" }),
   ];
 }
 
@@ -106,8 +123,14 @@ function cellTable(map) {
   return [caption, ["steps", "ωh", ...heads], rows];
 }
 
-function fillTable(details, [caption, heads, rows]) {
+function fillTable(details, content) {
   const table = document.createElement("table");
+  fillRows(table, content);
+  details.querySelector("div").replaceChildren(table);
+}
+
+function fillRows(table, [caption, heads, rows]) {
+  table.replaceChildren();
   table.createCaption().textContent = caption;
   const head = table.createTHead().insertRow();
   for (const text of heads) {
@@ -120,7 +143,6 @@ function fillTable(details, [caption, heads, rows]) {
     const line = body.insertRow();
     for (const text of row) line.insertCell().textContent = text;
   }
-  details.querySelector("div").replaceChildren(table);
 }
 
 // Make a member's run again, draw it beside the exact one, and say how it ends.
@@ -136,33 +158,55 @@ function showRun(map, member) {
   part.verdict.textContent = verdictOf(map, member, run);
   drawRun(map, part.height, "height of the centre [m]", run.time, run.height, exact && exact.drawn(), "height", exact);
   drawRun(map, part.energy, "mechanical energy [J]", run.time, run.energy, exact && exact.energy, "energy", exact);
-  part.caveat.textContent = caveatOf(map, member, exact);
+  fillOutcomes(map, member, run);
+  part.caveat.textContent = caveatOf(map, member, run, exact);
 }
 
 function verdictOf(map, member, run) {
-  const { sweep, cell } = map, words = sweep.criteria.map(({ name, limit }) => {
-    const stored = sweep.passes(name, cell, member), now = run.passes[name];
-    const held = now === null ? "too close to tell from the thinned path" : now ? "passes" : "fails";
-    const other = now !== null && now !== stored ? ` (stored: ${stored ? "passes" : "fails"})` : "";
-    return `${name} ${held}${other}, ${readableNumber(run.measures[name])} of at most ${limit}`;
-  });
-  const ended = run.ended.length > 0 ? ` It did not end well: ${run.ended.join(", ").replaceAll("_", " ")}.` : "";
-  const until = run.stepsDone < sweep.steps[cell] ? `, stopped after ${wholeNumber(run.stepsDone)} steps` : "";
-  return `Member ${member}, run here in ${Math.round(run.milliseconds)} ms${until}: ${words.join("; ")}.${ended}`;
+  const { sweep, cell } = map, failed = sweep.names.filter((name) => run.passes[name] === false);
+  const sentences = run.ended.map((name) => map.data.sentences[map.data.verdicts.indexOf(name)]);
+  const ended = sentences.length > 0 ? ` It did not end well: ${sentences.join("; ")}.` : "";
+  const early = run.stepsDone < sweep.steps[cell] ? ` It was judged until step ${wholeNumber(run.stepsDone)}, when all was decided, as the stored one.` : "";
+  const outcome = failed.length === 0 ? "it passes" : `it fails ${failed.join(", ")}`;
+  return `Member ${member}, ${wholeNumber(sweep.steps[cell])} steps run here in ${Math.round(run.milliseconds)} ms: ${outcome}.${ended}${early}`;
 }
 
-function caveatOf(map, member, exact) {
-  const { sweep, data, cell } = map, { place, energy } = data.drawn;
-  const same = sweep.turns
-    ? "This run is the stored one until chaos takes over: a last digit that differs grows, and late bounces may be others."
-    : "This run takes the stored one's steps one by one; the stored one took known motion at once, equal to round-off.";
-  if (exact === null) {
-    const known = sweep.column(cell).paths.length;
-    return `${same} No exact path of member ${member} is published: its launch is turned another way; members 0 to ${known - 1} have one.`;
+function fillOutcomes(map, member, run) {
+  const { sweep, cell } = map, word = (passes) => (passes === null ? "too close to tell" : passes ? "passes" : "fails");
+  const rows = sweep.criteria.map(({ name, limit }) => [
+    name, readableNumber(run.measures[name]), `≤ ${limit}`, word(run.passes[name]), word(sweep.passes(name, cell, member)),
+  ]);
+  const heads = ["criterion", "measure", "allowed", "this run", "stored run"];
+  fillRows(map.part.outcomes, [`Member ${member} by every criterion`, heads, rows]);
+}
+
+function caveatOf(map, member, run, exact) {
+  const { sweep, data, cell } = map;
+  const told = [sweep.turns
+    ? "A tumbling cube: this run is the stored one until chaos takes over. A last digit that differs (sine and cosine are the browser's) grows, and late bounces may be others."
+    : "This run takes every step, as the listings do, to the last bit. The stored one took known motion, such as flights, at once, which agrees to round-off."];
+  if (sweep.names.some((name) => run.passes[name] !== null && run.passes[name] !== sweep.passes(name, cell, member))) {
+    told.push("Here the two part: a last digit has moved the phase of a later touch-down, and with it the verdict.");
   }
-  const drawn = `The exact one is by the scheme event; it is stored as float32, thinned to within ${readableNumber(place)} radii and ${percent(energy * 10) === "1 %" ? "0.1 %" : percent(energy)} of the energy's range`;
-  const known = exact.until < sweep.scene.duration ? `, and ends at ${readableNumber(exact.until, 3)} s: beyond, it is chaos, and not known` : "";
-  return `${same} ${drawn}${known}.`;
+  if (exact === null) {
+    const last = sweep.column(cell).paths.length - 1;
+    told.push(`No exact path of member ${member} is published, as it is turned in its own way; members 0 to ${last} have one.`);
+  } else {
+    told.push(`The exact path is by the scheme event, stored as float32 and thinned: places within ${readableNumber(data.drawn.place)} radii, energies within ${100 * data.drawn.energy} % of their range.`);
+    if (exact.until < sweep.scene.duration) told.push(`It ends at ${readableNumber(exact.until, 3)} s (dotted): beyond, two tolerances part, and it is not known.`);
+  }
+  return told.join(" ");
+}
+
+/** Return the least and the largest of numbers that are finite. */
+function rangeOf(values) {
+  let low = Infinity, high = -Infinity;
+  for (const value of values) {
+    if (!Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  return [low, high];
 }
 
 function drawRun(map, element, title, time, values, known, key, exact) {
@@ -173,15 +217,11 @@ function drawRun(map, element, title, time, values, known, key, exact) {
     const look = { color: data.looks.ink, width: 1.3, dash: "dash" };
     traces.push({ type: "scatter", mode: "lines", name: "exact", x: known.time, y: known[key], line: look });
   }
-  const shown = known === null ? values : known[key];
-  let low = Infinity, high = -Infinity;
-  for (const value of shown) {
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-  }
-  const room = (high - low || 1) * 0.08, top = high + (high - low) * 0.6;
-  let most = -Infinity;
-  for (const value of values) most = Math.max(most, value);
+  const [low, high] = rangeOf(known === null ? values : known[key]), [least, most] = rangeOf(values);
+  const size = high - low || 1, top = Math.min(Math.max(most, high), high + 2 * size);
+  const bottom = Math.max(Math.min(least, low), low - size);
+  const beyond = most > top ? [`↑ this run goes up to ${readableNumber(most, 3)}`] : [];
+  if (least < bottom) beyond.push(`↓ down to ${readableNumber(least, 3)}`);
   const until = exact !== null && exact.until < sweep.scene.duration ? [exact.until] : [];
   Plotly.react(element, traces, {
     height: 260,
@@ -193,7 +233,11 @@ function drawRun(map, element, title, time, values, known, key, exact) {
     paper_bgcolor: "white",
     plot_bgcolor: "white",
     xaxis: { title: { text: "time [s]", standoff: 4 }, range: [0, sweep.scene.duration], zeroline: false },
-    yaxis: { title: { text: title }, range: [low - room, Math.min(Math.max(most, high) + room, top)], zeroline: false },
+    yaxis: { title: { text: title }, range: [bottom - 0.06 * (top - bottom), top + 0.04 * (top - bottom)], zeroline: false },
+    annotations: beyond.map((text, k) => ({
+      text, xref: "paper", yref: "paper", x: 0, y: 1 - 0.1 * k, xanchor: "left", yanchor: k === 0 ? "bottom" : "top",
+      showarrow: false, font: { size: 12, color: RUN_COLOR },
+    })),
     shapes: until.map((x) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color: data.looks.quiet, dash: "dot" } })),
   }, { responsive: true, displayModeBar: false });
 }
