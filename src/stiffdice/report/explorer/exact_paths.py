@@ -30,9 +30,9 @@ def packed(packer: Packer, scene: Scene, model: str, launch: States, horizon: fl
 
     launch: shape (1,). horizon [s]: until when `trajectory` compares, if it does.
 
-    `path`: time [s], height [m], its rate [m/s]; `energy`: time [s], mechanical energy [J]; `reference`: time [s], place
-    [m] and velocity [m/s], shape (node, 3) each, until the horizon; arrays one after another, each of `counts` nodes.
-    `until` [s]: from when on the path is not known.
+    Arrays lie one after another. Of `counts[0]` nodes: time [s], height [m], its rate [m/s]. Of `counts[1]`: time [s],
+    mechanical energy [J]. Of `counts[2]`, until the horizon: time [s], place [m] and velocity [m/s], shape (node, 3)
+    each. `until` [s]: from when on the path is not known.
     """
     time, place, velocity, energy = _known(scene, model, launch)
     bends = thinned(len(time), lambda a, b: _off_cubic(time, place, velocity, a, b) <= PLACE * scene.cube.radius)

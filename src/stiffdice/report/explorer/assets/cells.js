@@ -138,11 +138,12 @@ class ExactPath {
     this.reference = nodes > 0 ? { time: take(nodes), place: take(3 * nodes), velocity: take(3 * nodes) } : null;
   }
 
-  // Heights to draw, {time [s], height [m]}: each cubic by some points.
-  drawn(points = 24) {
+  // Heights to draw, {time [s], height [m]}: points at most `apart` [s] apart.
+  drawn(apart) {
     const { time, height, rate } = this.bends, found = { time: [time[0]], height: [height[0]] };
     for (let k = 0; k + 1 < time.length; k += 1) {
       const span = time[k + 1] - time[k], p = height[k], q = height[k + 1], u = rate[k] * span, v = rate[k + 1] * span;
+      const points = Math.max(2, Math.ceil(span / apart));
       for (let i = 1; i <= points; i += 1) {
         const s = i / points;
         found.time.push(time[k] + s * span);

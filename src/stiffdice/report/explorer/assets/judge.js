@@ -3,8 +3,8 @@
 
 // The path that `trajectory` compares with: a cubic between nodes {time, place, velocity}, times ascending.
 class Reference {
-  constructor({ time, place, velocity }, horizon) {
-    Object.assign(this, { time, place, velocity, horizon, at: 0 });
+  constructor({ time, place, velocity }) {
+    Object.assign(this, { time, place, velocity, at: 0 });
   }
 
   // Return how far a place is from the path at a time not before the one asked last [m].
@@ -59,10 +59,11 @@ function legDuration(zeta, pull, speed) {
 }
 
 // criteria: [{name, limit}] of the sweep. early: whether a run ends once all of them are decided. fewest: steps within
-// the linear limits, of a contact and of the drag. reference: a Reference, or null. late [s]: of the launch.
+// the linear limits, of a contact and of the drag. reference: a Reference, or null where it is not known. horizon [s]:
+// until when `trajectory` compares. late [s]: of the launch.
 class Judge {
-  constructor(scene, state, steps, { criteria, early, fewest, reference, late }) {
-    Object.assign(this, { scene, criteria, early, fewest, reference, late });
+  constructor(scene, state, steps, { criteria, early, fewest, reference, horizon, late }) {
+    Object.assign(this, { scene, criteria, early, fewest, reference, horizon, late });
     this.watch = startWatch(scene, state, steps);
     this.room = roomOf(scene, state);
     this.speedIn = NaN;
@@ -107,8 +108,8 @@ class Judge {
 
   /** criteria/trajectory.py; return whether the horizon is passed. */
   comparePath(time, state) {
+    if (time > this.horizon) return true;
     if (!this.reference) return false;
-    if (time > this.reference.horizon) return true;
     const off = this.reference.distance(time, state.position) / this.scene.radius;
     this.measures.trajectory = Math.max(this.measures.trajectory, off);
     return false;

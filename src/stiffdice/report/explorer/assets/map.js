@@ -176,7 +176,7 @@ class StabilityMap {
       hovertemplate: "%{text}<extra></extra>",
       coloraxis: "coloraxis",
     }));
-    const layout = mapLayout(this, columns);
+    const layout = mapLayout(this, traces);
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d"] };
     Plotly.react(this.part.map, [...traces, ...edgeTraces(this, columns), cursorTrace(this)], layout, options);
     if (!this.clicks) {

@@ -26,11 +26,10 @@ function ticksOf(low, high) {
   return found.filter((value) => value >= low && value <= high);
 }
 
-function mapLayout(map, columns) {
-  const { axis, data, sweep } = map, centres = columns.map(({ stiffness }) => stiffness);
+function mapLayout(map, tiles) {
+  const { axis, data, sweep } = map;
   const magic = axis === "omega_h" ? MAGIC.map((n) => [n, 2 * Math.sin(Math.PI / (2 * n))]) : [];
-  const sides = bordersOf(centres), places = map.cells.flat().map((cell) => map.place(cell));
-  const log = (values) => values.map(Math.log10), low = Math.min(...places), high = Math.max(...places);
+  const log = (values) => values.map(Math.log10), sides = tiles.flatMap(({ x }) => x), [low, high] = rangeOf(tiles.flatMap(({ y }) => y));
   const tickvals = ticksOf(low, high);
   return {
     height: isNarrow() ? 420 : 520,
@@ -42,7 +41,7 @@ function mapLayout(map, columns) {
     paper_bgcolor: "white",
     plot_bgcolor: "white",
     showlegend: false,
-    xaxis: { ...logAxis("stiffness S [kg/s²]"), range: log([sides[0], sides[sides.length - 1]]), exponentformat: "power", dtick: 1 },
+    xaxis: { ...logAxis("stiffness S [kg/s²]"), range: log(rangeOf(sides)), exponentformat: "power", dtick: 1 },
     yaxis: {
       ...logAxis(axis === "steps" ? `time steps in ${sweep.scene.duration} s [1]` : "ωh of a flat landing [1]"),
       range: log([low, high]),
@@ -156,7 +155,7 @@ function showRun(map, member) {
     : failing[0] === member ? `It is the first of the ${failing.length} that fail ${map.criterion}.`
     : `${failing.length} of ${sweep.members} fail ${map.criterion}.`;
   part.verdict.textContent = verdictOf(map, member, run);
-  drawRun(map, part.height, "height of the centre [m]", run.time, run.height, exact && exact.drawn(), "height", exact);
+  drawRun(map, part.height, "height of the centre [m]", run.time, run.height, exact && exact.drawn(sweep.scene.duration / 600), "height", exact);
   drawRun(map, part.energy, "mechanical energy [J]", run.time, run.energy, exact && exact.energy, "energy", exact);
   fillOutcomes(map, member, run);
   part.caveat.textContent = caveatOf(map, member, run, exact);

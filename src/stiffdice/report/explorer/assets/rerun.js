@@ -11,8 +11,11 @@ const DRAWN = 3000; // about so many states are kept
 function rerun(data, sweep, cell, member, exact) {
   const began = performance.now(), { late, scene } = sweep.member(cell, member), steps = sweep.steps[cell];
   const state = launchOf(scene), h = scene.duration / steps, stride = Math.max(1, Math.floor(steps / DRAWN));
-  const known = exact && exact.reference ? new Reference(exact.reference, sweep.horizon) : null;
-  const how = { criteria: sweep.criteria, early: sweep.early_stop, fewest: sweep.column(cell).fewest, reference: known, late };
+  const known = exact && exact.reference ? new Reference(exact.reference) : null;
+  const how = {
+    criteria: sweep.criteria, early: sweep.early_stop, fewest: sweep.column(cell).fewest, reference: known, late,
+    horizon: sweep.horizon ?? Infinity,
+  };
   const judge = new Judge(scene, state, steps, how), run = { time: [], height: [], energy: [] };
   const keep = (step) => {
     run.time.push(late + step * h);
@@ -28,10 +31,10 @@ function rerun(data, sweep, cell, member, exact) {
     if (inRange && step % stride === 0) keep(step);
   }
   found ??= judge.finish(state);
-  if ("trajectory" in found.passes && found.ended.length === 0) {
+  if ("trajectory" in found.passes) {
     const { limit } = sweep.criteria.find(({ name }) => name === "trajectory");
     const close = Math.abs(found.measures.trajectory - limit) <= 4 * data.drawn.place;
-    if (known === null || close) found.passes.trajectory = null;
+    if (known === null || (close && found.ended.length === 0)) found.passes.trajectory = null;
   }
   return { ...run, ...found, stepsDone: judge.step, milliseconds: performance.now() - began };
 }
