@@ -1,7 +1,8 @@
 // Put the parts of the page together.
 
-/** Return plotly, unpacked from the page itself on the first call. */
 let plotlyPromise = null;
+
+/** Return a promise of plotly, which the first call unpacks from the page itself. */
 function loadPlotly() {
   plotlyPromise ??= unpackPlotly();
   return plotlyPromise;
@@ -23,5 +24,8 @@ function pageData() {
 
 document.addEventListener("DOMContentLoaded", () => {
   const data = pageData();
+  document.getElementById("version").textContent = data.version;
   mountMap(document.getElementById("map"), data.map);
+  mountThrow(document.getElementById("throw"), data.throw);
+  mountDie(document.getElementById("die"), data.die);
 });

@@ -6,7 +6,7 @@ const LAG = 0.5; // steps by which symplectic Euler's velocity is behind its pla
 
 // From mild to grave; a run has the gravest that applies.
 const VERDICTS = {
-  passed: "passed: energy and apex criteria hold; accuracy is another question",
+  passed: "passed: every criterion that was looked at holds; accuracy is another question",
   unresolved: "unresolved: steps beyond the linear limit of a force it met, or of more than half a turn",
   apex_rose: "apex rose: a rebound went higher than the one before",
   energy_grew: "energy grew: the cube had more energy in the air than at the launch",
