@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,13 +21,7 @@ from stiffdice.simulation.initial_conditions import phased, turned
 from stiffdice.simulation.reference_run import references
 from stiffdice.simulation.run import simulate
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on the PATH: the page is tested in one"),
-]
+pytestmark = pytest.mark.long
 
 _POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
@@ -67,16 +60,8 @@ def published(tmp_path_factory):
     return target
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        shown = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield shown
-        shown.close()
-
-
-def show(browser: Any, target: Path, width: int = 1280) -> Shown:
-    page, trouble = browser.new_page(viewport={"width": width, "height": 900}), []
+def show(chromium: Any, target: Path, width: int = 1280) -> Shown:
+    page, trouble = chromium.new_page(viewport={"width": width, "height": 900}), []
     page.on("console", lambda message: trouble.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: trouble.append(str(error)))
     page.on("request", lambda asked: None if asked.url.startswith(("file:", "blob:")) else trouble.append(asked.url))
@@ -87,8 +72,8 @@ def show(browser: Any, target: Path, width: int = 1280) -> Shown:
 
 
 @pytest.fixture
-def shown(browser, published):
-    found = show(browser, published)
+def shown(chromium, published):
+    found = show(chromium, published)
     yield found
     assert found.trouble == []
     found.page.close()
@@ -339,17 +324,17 @@ def test_tables_say_what_the_map_shows(shown, published):
     assert [numbers(row)[0] for row in rows] == sweep.steps.values[of_column].tolist()
 
 
-def test_it_fits_a_phone_and_asks_nobody_for_anything(browser, published):
-    found = show(browser, published, width=390)
+def test_it_fits_a_phone_and_asks_nobody_for_anything(chromium, published):
+    found = show(chromium, published, width=390)
     assert found.page.evaluate("document.documentElement.scrollWidth") <= 390
     assert found.trouble == []
     found.page.close()
 
 
-def test_without_stored_studies_the_page_says_what_makes_them(browser, tmp_path):
+def test_without_stored_studies_the_page_says_what_makes_them(chromium, tmp_path):
     target = tmp_path / "explorer.html"
     explorer.write(tmp_path, target)
-    page = browser.new_page()
+    page = chromium.new_page()
     page.goto(target.as_uri())
     page.wait_for_function("document.getElementById('map').textContent.includes('make stability')")
     page.close()

@@ -61,7 +61,7 @@ def collect(results: Path, studies: Sequence[str] = STUDIES) -> dict[str, Any]:
         "paths": paths.packed,
         "drawn": drawn | {"known": exact_paths.KNOWN},
         "blow_up": BLOW_UP,
-        "looks": {"theory": style.THEORY["color"], "ink": style.INK, "quiet": style.QUIET},
+        "looks": {"theory": style.THEORY["color"], "ink": style.INK},
         "laws": style.LAW_NAMES,
         "verdicts": [verdict.name.lower() for verdict in Verdict],
         "sentences": [verdict.sentence for verdict in Verdict],

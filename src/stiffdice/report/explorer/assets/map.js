@@ -118,6 +118,7 @@ class StabilityMap {
     });
     this.field.member.addEventListener("change", ({ target }) => this.show(Number(target.value)));
     this.part.map.addEventListener("keydown", (event) => this.press(event));
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.refresh());
     for (const name of ["edges", "cells"]) this.part[name].addEventListener("toggle", () => this.tables());
   }
 
@@ -199,7 +200,7 @@ class StabilityMap {
   /** Label what is seen of the axis of ωh after a zoom. */
   tick() {
     if (this.axis !== "omega_h") return;
-    const [low, high] = this.part.map.layout.yaxis.range.map((power) => 10 ** power), values = ticksOf(low, high);
+    const [low, high] = this.part.map.layout.yaxis.range.map((power) => 10 ** power), values = logTicks(low, high);
     Plotly.relayout(this.part.map, { "yaxis.tickvals": values, "yaxis.ticktext": values.map(String) });
   }
 

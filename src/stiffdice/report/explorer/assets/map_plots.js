@@ -1,7 +1,16 @@
 // What the stability map draws and says: axes, edges, the numbers of a cell, a member's run beside the exact one.
 
-const RUN_COLOR = "#0072B2";
-const PLOT_FONT = { family: "inherit", size: 13 };
+const CLEAR = "rgba(0,0,0,0)";
+
+/** Return a colour of style.css, light or dark. */
+function themed(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+/** Return what all plots share: the page's own font and colours. */
+function plotLook() {
+  return { font: { family: "system-ui, sans-serif", size: 13, color: themed("--ink") }, paper_bgcolor: CLEAR, plot_bgcolor: CLEAR };
+}
 
 function isNarrow() {
   return window.innerWidth < 600;
@@ -12,7 +21,7 @@ function logAxis(title) {
 }
 
 /** Return round numbers between two of a logarithmic axis: 1, 2 and 5 times powers of ten, or finer ones. */
-function ticksOf(low, high) {
+function logTicks(low, high) {
   const found = [];
   if (high / low > 4) {
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
@@ -27,19 +36,17 @@ function ticksOf(low, high) {
 }
 
 function mapLayout(map, tiles) {
-  const { axis, data, sweep } = map;
+  const { axis, sweep } = map;
   const magic = axis === "omega_h" ? MAGIC.map((n) => [n, 2 * Math.sin(Math.PI / (2 * n))]) : [];
   const log = (values) => values.map(Math.log10), sides = tiles.flatMap(({ x }) => x), [low, high] = rangeOf(tiles.flatMap(({ y }) => y));
-  const tickvals = ticksOf(low, high);
+  const tickvals = logTicks(low, high);
   return {
     height: isNarrow() ? 420 : 520,
     margin: { l: 58, r: 44, t: 12, b: 118 },
-    font: PLOT_FONT,
+    ...plotLook(),
     hovermode: "closest",
     dragmode: isNarrow() ? false : "zoom",
     uirevision: `${sweep.name} ${axis}`,
-    paper_bgcolor: "white",
-    plot_bgcolor: "white",
     showlegend: false,
     xaxis: { ...logAxis("stiffness S [kg/s²]"), range: log(rangeOf(sides)), exponentformat: "power", dtick: 1 },
     yaxis: {
@@ -58,7 +65,7 @@ function mapLayout(map, tiles) {
     },
     annotations: magic.map(([n, omegaH]) => ({
       xref: "paper", x: 1, xanchor: "left", y: Math.log10(omegaH), text: `– n=${n}`, showarrow: false,
-      font: { size: 11, color: data.looks.ink },
+      font: { size: 11 },
     })),
   };
 }
@@ -154,14 +161,14 @@ function showRun(map, member) {
     failing.length === 0 ? `All ${sweep.members} pass ${map.criterion}.`
     : failing[0] === member ? `It is the first of the ${failing.length} that fail ${map.criterion}.`
     : `${failing.length} of ${sweep.members} fail ${map.criterion}.`;
-  part.verdict.textContent = verdictOf(map, member, run);
+  part.verdict.textContent = verdictWords(map, member, run);
   drawRun(map, part.height, "height of the centre [m]", run.time, run.height, exact && exact.drawn(sweep.scene.duration / 600), "height", exact);
   drawRun(map, part.energy, "mechanical energy [J]", run.time, run.energy, exact && exact.energy, "energy", exact);
   fillOutcomes(map, member, run);
   part.caveat.textContent = caveatOf(map, member, run, exact);
 }
 
-function verdictOf(map, member, run) {
+function verdictWords(map, member, run) {
   const { sweep, cell } = map, failed = sweep.names.filter((name) => run.passes[name] === false);
   const sentences = run.ended.map((name) => map.data.sentences[map.data.verdicts.indexOf(name)]);
   const ended = sentences.length > 0 ? ` It did not end well: ${sentences.join("; ")}.` : "";
@@ -209,11 +216,11 @@ function rangeOf(values) {
 }
 
 function drawRun(map, element, title, time, values, known, key, exact) {
-  const { sweep, data } = map, traces = [
-    { type: "scatter", mode: "lines", name: "this run", x: time, y: values, line: { color: RUN_COLOR, width: 2 } },
+  const { sweep } = map, traces = [
+    { type: "scatter", mode: "lines", name: "this run", x: time, y: values, line: { color: themed("--accent"), width: 2 } },
   ];
   if (known !== null) {
-    const look = { color: data.looks.ink, width: 1.3, dash: "dash" };
+    const look = { color: themed("--ink"), width: 1.3, dash: "dash" };
     traces.push({ type: "scatter", mode: "lines", name: "exact", x: known.time, y: known[key], line: look });
   }
   const [low, high] = rangeOf(known === null ? values : known[key]), [least, most] = rangeOf(values);
@@ -225,18 +232,16 @@ function drawRun(map, element, title, time, values, known, key, exact) {
   Plotly.react(element, traces, {
     height: 260,
     margin: { l: 64, r: 12, t: 28, b: 40 },
-    font: PLOT_FONT,
+    ...plotLook(),
     dragmode: isNarrow() ? false : "zoom",
     showlegend: true,
     legend: { orientation: "h", y: 1.14, x: 1, xanchor: "right" },
-    paper_bgcolor: "white",
-    plot_bgcolor: "white",
-    xaxis: { title: { text: "time [s]", standoff: 4 }, range: [0, sweep.scene.duration], zeroline: false },
-    yaxis: { title: { text: title }, range: [bottom - 0.06 * (top - bottom), top + 0.04 * (top - bottom)], zeroline: false },
+    xaxis: { gridcolor: themed("--grid"), title: { text: "time [s]", standoff: 4 }, range: [0, sweep.scene.duration], zeroline: false },
+    yaxis: { gridcolor: themed("--grid"), title: { text: title }, range: [bottom - 0.06 * (top - bottom), top + 0.04 * (top - bottom)], zeroline: false },
     annotations: beyond.map((text, k) => ({
       text, xref: "paper", yref: "paper", x: 0, y: 1 - 0.1 * k, xanchor: "left", yanchor: k === 0 ? "bottom" : "top",
-      showarrow: false, font: { size: 12, color: RUN_COLOR },
+      showarrow: false, font: { size: 12, color: themed("--accent") },
     })),
-    shapes: until.map((x) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color: data.looks.quiet, dash: "dot" } })),
+    shapes: until.map((x) => ({ type: "line", x0: x, x1: x, yref: "paper", y0: 0, y1: 1, line: { color: themed("--faint"), dash: "dot" } })),
   }, { responsive: true, displayModeBar: false });
 }
