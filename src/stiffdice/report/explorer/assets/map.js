@@ -83,7 +83,7 @@ class StabilityMap {
 
   titleOf(sweep) {
     const stiffnesses = new Set(sweep.columns.map(({ stiffness }) => stiffness)).size;
-    return `${sweep.model} (results/${sweep.name.replace("/", "/sweeps/")}): ${stiffnesses} stiffnesses`;
+    return `${sweep.model}, ${stiffnesses} stiffnesses (${sweep.name})`;
   }
 
   options(select, pairs) {
@@ -131,7 +131,7 @@ class StabilityMap {
     this.radios(this.part.laws, "law", laws.map((law) => [law, this.data.laws[law]]), this.law);
     this.radios(this.part.criteria, "criterion", criteria, this.criterion);
     this.part.about.textContent =
-      `${sweep.steps.length.toLocaleString("en")} cells of ${sweep.members} members each: launches spread over the ` +
+      `results/${sweep.name.replace("/", "/sweeps/")}: ${sweep.steps.length.toLocaleString("en")} cells of ${sweep.members} members each: launches spread over the ` +
       `phase of the first touch-down${sweep.turns ? ", the orientation and the axis of the spin" : ""}. ` +
       `${sweep.scene.duration} s, symplectic Euler, ${sweep.ground}.`;
     this.cell = null;
@@ -180,6 +180,7 @@ class StabilityMap {
     const layout = mapLayout(this, traces);
     const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d"] };
     Plotly.react(this.part.map, [...traces, ...edgeTraces(this, columns), cursorTrace(this)], layout, options);
+    this.tick(); // a zoom outlasts a change of law or criterion
     if (!this.clicks) {
       this.clicks = true;
       this.part.map.on("plotly_click", ({ points }) => {

@@ -74,16 +74,16 @@ function edgeTraces(map, columns) {
   const { axis, criterion, data } = map, { color } = map.about(criterion);
   const at = (column, steps) => (steps === null || axis === "steps" ? steps : column.radians / steps);
   const x = columns.map(({ stiffness }) => stiffness), look = { hoverinfo: "skip", x };
-  const limit = columns.map((column) => at(column, column.limit));
+  const limit = columns.map((column) => at(column, column.limit)), size = isNarrow() ? 9 : 13;
   const marks = (edge, marker) => ({
     ...look, type: "scatter", mode: "markers", y: columns.map((column) => at(column, column[edge][criterion])), marker,
   });
   return [
     { ...look, type: "scatter", mode: "lines", y: limit, line: { color: "white", width: 3.5 } },
     { ...look, type: "scatter", mode: "lines", y: limit, line: { color: data.looks.theory, width: 1.5, dash: "dash" } },
-    marks("last_fail", { size: 11, color, line: { color: "white", width: 1.5 }, symbol: "triangle-up" }),
-    marks("first_pass", { size: 13, color: "white", line: { width: 6 }, symbol: "circle-open" }),
-    marks("first_pass", { size: 13, color, line: { width: 3 }, symbol: "circle-open" }),
+    marks("last_fail", { size: size - 2, color, line: { color: "white", width: 1.5 }, symbol: "triangle-up" }),
+    marks("first_pass", { size, color: "white", line: { width: size / 2 }, symbol: "circle-open" }),
+    marks("first_pass", { size, color, line: { width: size / 4 }, symbol: "circle-open" }),
   ];
 }
 
