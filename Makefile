@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes explorer study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -54,6 +54,9 @@ shapes: install  ## which face of a box comes up by shape and load, into results
 
 pair: install  ## two cubes: the steps they need, how they leave each other, orders of schemes, into results/pair/
 	@$(RUN) pair
+
+explorer: paper stability  ## one page for a browser: the stability map, live throws, a die; into results/explorer.html
+	@$(RUN) explorer
 
 study: install  ## run config/NAME.yaml, into results/NAME/: make study STUDY=NAME
 	@$(RUN) study --config 'study=$(STUDY)'

@@ -10,6 +10,7 @@
 #   snakemake tosses                      real tosses of a cube, and the simulation beside them
 #   snakemake shapes                      which face of a box comes up, by shape and load
 #   snakemake pair                        two cubes that meet: steps they need, how they leave each other
+#   snakemake explorer                    one page for a browser, of the studies that are stored
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
 #
 # A study is a file in config/; its results lie in results/ under the same name.
@@ -24,6 +25,7 @@ include: "workflow/rules/scenes.smk"
 include: "workflow/rules/sweep.smk"
 include: "workflow/rules/experiments.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/explorer.smk"
 
 
 report: "workflow/report/workflow.rst"

@@ -48,6 +48,7 @@ PAGES = [
     "docs/how-to/verify.md",
     "docs/how-to/diff.md",
     "docs/how-to/status.md",
+    "docs/how-to/explorer.md",
     "docs/how-to/robustness.md",
     "docs/reference/trust.md",
     "docs/how-to/slurm.md",

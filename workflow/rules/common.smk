@@ -94,6 +94,13 @@ def not_stale(wildcards):
     return []
 
 
+def always(wildcards):
+    """Return no file, as input of the explorer, which is made whenever it is asked for, as that takes seconds."""
+    if workflow.is_main_process:
+        workflow.dag.forcefiles.add("results/explorer.html")
+    return []
+
+
 def planned(kind):
     """Return a parameter: what a study plans for a job, a `run`, `sweep`, `experiment`, `timing`, `figure` or `table`."""
     return lambda wildcards: getattr(study(wildcards.study), f"{kind}s")[wildcards[kind]]

@@ -169,7 +169,8 @@ class _Log:
         import resource
 
         for output in map(Path, job.output):
-            self.say(self._words.made(Path(*output.parts[2:]).as_posix(), self._words.digest_of(output)))
+            name = Path(*output.parts[2:] or output.parts[-1:]).as_posix()
+            self.say(self._words.made(name, self._words.digest_of(output)))
         self.say(self._words.memory((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10) / 1e6))
         self.say(self._words.done(time.monotonic() - self._begun))
 

@@ -18,7 +18,7 @@ from stiffdice.simulation.run import simulate
 
 STEPS, EVERY = 10_000, 10
 # Runs the page's kernel and returns the bytes of some arrays.
-RUN = """([scene, steps, stride]) => {
+RUN = """([scene, steps, stride, names]) => {
   const packed = (array) => {
     const bytes = new Uint8Array(array.buffer, 0, array.length * 8);
     let text = "";
@@ -26,14 +26,14 @@ RUN = """([scene, steps, stride]) => {
     return btoa(text);
   };
   const run = simulate(scene, steps, stride), told = { count: run.count, done: run.done, verdict: run.verdict };
-  for (const name of ["t", "position", "velocity", "momentum", "nodes", "mechanical"]) told[name] = packed(run[name]);
+  for (const name of names) told[name] = packed(run[name]);
   return told;
 }"""
 
 
-def in_browser(tab, scene, model, steps=STEPS, every=EVERY):
-    told = tab.evaluate(RUN, [scene_data.plain(scene, model), steps, every])
-    for name in ("t", "position", "velocity", "momentum", "nodes", "mechanical"):
+def in_browser(tab, scene, model, *names, steps=STEPS, every=EVERY):
+    told = tab.evaluate(RUN, [scene_data.plain(scene, model), steps, every, names])
+    for name in names:
         whole = np.frombuffer(base64.b64decode(told[name])).reshape(steps // every + 1, -1)
         told[name] = whole[: told["count"]].squeeze()
     return told
@@ -72,7 +72,7 @@ def compared_with_files(opened, folder, seeds):
         run = simulate(scene, model="sliding", steps=STEPS, every=EVERY)
         with np.errstate(all="ignore"):
             write_dataset(run_dataset(run), folder / "run.h5")
-        told = in_browser(tab, scene, "sliding")
+        told = in_browser(tab, scene, "sliding", "t", "position", "velocity")
         with h5py.File(folder / "run.h5") as stored:
             for name in ("position", "velocity"):
                 assert np.array_equal(told[name], stored[name][()]), (seed, name)
@@ -101,10 +101,10 @@ def test_a_thousand_sliding_runs_are_the_stored_ones_to_the_last_bit(opened, tmp
 def test_a_cube_that_turns_is_where_it_should_be_up_to_its_first_bounce(opened):
     tab = opened()
     worst, bounced = 0.0, 0
-    for seed in range(50):
+    for seed in range(20):
         scene = random_scene(np.random.default_rng(seed), spin=2.0)
-        run = simulate(scene, model="tumbling", steps=STEPS, every=EVERY)
-        told, state = in_browser(tab, scene, "tumbling"), run.trajectory.state
+        state = simulate(scene, model="tumbling", steps=STEPS, every=1).trajectory.state
+        told = in_browser(tab, scene, "tumbling", "position", "nodes", every=1)
         touched = np.flatnonzero((state["position"][:, None] + state["node_offset"]) @ scene.ground.normal <= 0)
         before = slice(0, touched[0] // 8 if len(touched) else None)
         bounced += len(touched) > 0
@@ -112,7 +112,7 @@ def test_a_cube_that_turns_is_where_it_should_be_up_to_its_first_bounce(opened):
         places, nodes = state["position"][before], state["node_offset"][before].reshape(-1, 24)
         worst = max(worst, np.abs(told["position"][before] - places).max() / scale["position"])
         worst = max(worst, np.abs(told["nodes"][before] - nodes).max() / scale["nodes"])
-    assert bounced > 25
+    assert bounced > 10
     print(f"largest distance before the first bounce: {worst:.2g}")
     assert worst <= 1e-12
 
@@ -123,7 +123,7 @@ def test_a_cube_that_turns_is_where_it_should_be_up_to_its_first_bounce(opened):
 def test_the_papers_cure_is_a_lucky_number_in_the_page_as_in_the_simulator(opened, preset, steps):
     scene = from_mapping({"ground": {"stiffness": 1e6}}, preset)
     run = simulate(scene, model="sliding", steps=steps, every=100)
-    told = in_browser(opened(), scene, "sliding", steps, 100)
+    told = in_browser(opened(), scene, "sliding", "position", "mechanical", steps=steps, every=100)
     expected = {10_000: "energy_grew", 20_000: "passed", 23_000: "apex_rose" if preset == "as_written" else "passed"}
     assert told["verdict"]["name"] == expected[steps] == Verdict(int(run.verdict[0])).name.lower()
     assert np.array_equal(told["position"], run.trajectory.state["position"])
@@ -134,7 +134,7 @@ def test_the_papers_cure_is_a_lucky_number_in_the_page_as_in_the_simulator(opene
 def test_a_run_that_leaves_the_range_of_doubles_ends_there(opened):
     scene = from_mapping({"launch": {"velocity": [1e307, 0, 0]}, "duration": 100}, "as_listed")
     run = simulate(scene, model="sliding", steps=2_000, every=1)
-    told = in_browser(opened(), scene, "sliding", 2_000, 1)
+    told = in_browser(opened(), scene, "sliding", "position", steps=2_000, every=1)
     assert told["verdict"]["name"] == "left_numeric_range" == Verdict(int(run.verdict[0])).name.lower()
     assert told["done"] == run.steps_done[0] < 2_000
     assert np.array_equal(told["position"], run.trajectory.state["position"])

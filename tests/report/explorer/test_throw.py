@@ -127,11 +127,11 @@ def test_the_replay_plays_pauses_and_is_scrubbed(opened):
     scrub = tab.locator("#throw-scrub")
     scrub.focus()
     scrub.press("End")
-    assert shown.inner_text() == "10.0 s"
+    assert shown.inner_text() == "10.00 s"
     cursor = tab.locator("#throw-height .cursor")
     right = float(cursor.get_attribute("x1"))
     scrub.press("Home")
-    assert shown.inner_text() == "0.0 s"
+    assert shown.inner_text() == "0.00 s"
     assert float(cursor.get_attribute("x1")) < right
     assert tab.evaluate(picture) == at_launch
 
@@ -140,7 +140,7 @@ def test_who_asks_for_less_motion_gets_no_replay_unasked(opened):
     tab = opened(reduced_motion="reduce")
     tab.get_by_role("button", name="20,000 steps").click()
     tab.wait_for_timeout(300)
-    assert tab.locator("#throw-clock").inner_text() == "0.0 s"
+    assert tab.locator("#throw-clock").inner_text() == "0.00 s"
     assert tab.locator("#throw-play").inner_text() == "Play"
 
 

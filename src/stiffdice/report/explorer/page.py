@@ -12,6 +12,7 @@ from typing import Any
 import stiffdice
 from stiffdice.errors import InputError
 from stiffdice.experiments.dice.throws import default_steps
+from stiffdice.io.writer import write_bytes
 from stiffdice.report.explorer import map_data, scene_data
 from stiffdice.scene import die
 from stiffdice.scene import scene as scenes
@@ -51,7 +52,7 @@ def build(results: Path) -> str:
 
 def write(results: Path, target: Path) -> None:
     """Write the page of the studies in a results folder; raises InputError if it is too large."""
-    target.write_text(build(results), encoding="utf-8")
+    write_bytes(build(results).encode(), target)
 
 
 def data_of(results: Path) -> dict[str, Any]:

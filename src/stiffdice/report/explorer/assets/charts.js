@@ -48,7 +48,7 @@ function ticksOf(low, high, about) {
  */
 function lineChart(element) {
   let content = null, time = 0, cursorLine = null, place = null;
-  const box = { left: 52, right: 8, top: 8, bottom: 30, height: 190 };
+  const box = { left: 52, right: 8, top: 8, bottom: 34, height: 194 };
 
   function draw(given) {
     content = given ?? content;
@@ -65,10 +65,10 @@ function lineChart(element) {
       root.append(svg("text", { class: "tick end", x: box.left - 6, y: rise(y) + 4 }, readable(y)));
     }
     for (const t of ticksOf(0, end, width > 400 ? 10 : 5)) {
-      root.append(svg("text", { class: "tick middle", x: place(t), y: box.height - 14 }, readable(t)));
+      root.append(svg("text", { class: "tick middle", x: place(t), y: box.height - 18 }, readable(t)));
     }
-    root.append(svg("text", { class: "tick end", x: width - box.right, y: box.height - 2 }, "time [s]"));
-    root.append(svg("text", { class: "tick", x: 2, y: box.height - 2 }, unit));
+    root.append(svg("text", { class: "tick end", x: width - box.right, y: box.height - 5 }, "time [s]"));
+    root.append(svg("text", { class: "tick", x: 2, y: box.height - 5 }, unit));
     for (const { y } of content.marks) {
       root.append(svg("line", { class: "mark", x1: box.left, x2: width - box.right, y1: rise(y), y2: rise(y) }));
     }

@@ -72,9 +72,7 @@ function mountDie(element, die) {
   }
 
   async function throwMany(count) {
-    if (busy) return;
-    busy = true;
-    for (const button of buttons.children) button.disabled = true;
+    setBusy(true);
     let last = null;
     for (let done = 0; done < count; done += BATCH) {
       for (let k = 0; k < BATCH; k++) last = throwOne();
@@ -83,13 +81,18 @@ function mountDie(element, die) {
     }
     showThrow(last);
     summary.textContent = toldOfCounts(counts, others);
-    for (const button of buttons.children) button.disabled = false;
-    busy = false;
+    setBusy(false);
+  }
+
+  function setBusy(yes) {
+    busy = seed.disabled = yes;
+    // Not `disabled`, which takes the keyboard's focus away.
+    for (const made of buttons.children) made.setAttribute("aria-disabled", String(yes));
   }
 
   const button = (text, id, act) => {
     const made = html("button", { type: "button", id }, text);
-    made.addEventListener("click", act);
+    made.addEventListener("click", () => busy || act());
     return made;
   };
   const once = button("Throw", "die-throw", () => {

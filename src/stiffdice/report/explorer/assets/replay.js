@@ -1,6 +1,7 @@
 // A thrown cube in three dimensions, on a canvas: parallel projection, the camera goes with the cube.
 
 const YAW = -0.6, PITCH = 0.42; // of the view [rad]
+const FARTHEST = 1e9; // [m] beyond which nothing is painted: a pixel is less than round-off
 // Pips of the faces 1 to 6, in parts of half an edge along the two other edges.
 const PIPS = [
   [[0, 0]],
@@ -107,7 +108,7 @@ function mountReplay({ canvas, play, scrub, clock, speed }) {
     run = given;
     time = 0;
     scrub.max = run.t[run.count - 1];
-    scrub.step = run.t[run.count - 1] / 1000;
+    scrub.step = "any";
     setPlaying(playing);
     paint();
   }
@@ -133,7 +134,7 @@ function mountReplay({ canvas, play, scrub, clock, speed }) {
     if (!run || canvas.clientWidth === 0) return;
     paintRun(canvas, run, time);
     scrub.value = time;
-    const told = `${time.toFixed(run.t[run.count - 1] < 5 ? 2 : 1)} s`;
+    const told = `${time.toFixed(2)} s`;
     scrub.setAttribute("aria-valuetext", told);
     clock.textContent = told;
     replay.onTime?.(time);
@@ -167,9 +168,9 @@ function paintRun(canvas, run, time) {
   const edges = [0, 1, 2].map((edge) => halfEdge(run.nodes, edge, 3 * NODES * row));
   // The higher the cube, the farther the camera, so that the ground stays in sight.
   const metres = Math.min(Math.max(4.5 * side, 1.5 * (centre[2] + side)), 40 * side);
-  const focus = [centre[0], centre[1], Math.max(0.38 * metres, centre[2] - 0.4 * metres)];
-  if (!centre.every((part) => Math.abs(part) < 1e9)) return;
+  const focus = [centre[0], centre[1], Math.max(0.38 * metres, centre[2] - 0.4 * metres) + Math.min(0, centre[2])];
   const painter = painterOf(canvas, focus, metres);
+  if (!centre.every((part) => Math.abs(part) < FARTHEST)) return;
   paintGround(painter, centre, side, colour("--grid"));
   const way = [];
   for (let k = 0; k <= row; k += 1 + Math.floor(row / 800)) way.push([0, 1, 2].map((axis) => run.position[3 * k + axis]));
@@ -178,9 +179,10 @@ function paintRun(canvas, run, time) {
   paintCube(painter, centre, edges, { hue: colour("--cube-hue"), edge: colour("--cube-edge"), pip: colour("--pip") });
 }
 
-/** Paint lines on the ground, as far apart as the side of the cube or a round part of it. */
+/** Paint lines on the ground, the farther apart the farther away the camera. */
 function paintGround(painter, centre, side, colour) {
-  const gap = side > 0.5 ? 1 : 0.02, reach = Math.ceil((2 * painter.width) / gap) * gap;
+  const near = side > 0.5 ? 1 : 0.02, gap = painter.width > 20 * near ? 5 * near : near;
+  const reach = Math.ceil((1.5 * painter.width) / gap) * gap;
   const [x, y] = [0, 1].map((axis) => Math.round(centre[axis] / gap) * gap);
   for (let offset = -reach; offset <= reach; offset += gap) {
     painter.line([[x + offset, y - reach, 0], [x + offset, y + reach, 0]], colour);

@@ -9,7 +9,7 @@ const CONTROLS = [
   { key: "steps", label: "Time steps", unit: "to 10 s", low: 1000, high: MOST_STEPS, scale: "log", whole: true },
   { key: "damping", label: "Damping D of a node", unit: "kg/s", low: 0, high: 5, scale: "linear", step: 0.01 },
   { key: "friction", label: "Friction coefficient µ", unit: "no unit", low: 0, high: 1, scale: "linear", step: 0.005 },
-  { key: "spin", label: "Angular momentum L", unit: "kg m²/s", low: 0, high: 0.75, scale: "linear", step: 0.01 },
+  { key: "spin", label: "Spin", unit: "kg m²/s: (L, L/2, L/4)", low: 0, high: 0.75, scale: "linear", step: 0.01 },
 ];
 // The paper's cure, 20,000 steps, is a lucky number: docs/explanation/stability.md.
 const START = { stiffness: 1e6, steps: 10000, damping: 0.2, friction: 0.075, spin: 0, preset: "as_written", model: "sliding" };
@@ -103,7 +103,7 @@ function replayParts(id, name) {
   const canvas = html("canvas", { class: "view", id: `${id}-view`, role: "img", "aria-label": name });
   const play = html("button", { type: "button", id: `${id}-play` }, "Play");
   const scrub = html("input", { type: "range", id: `${id}-scrub`, min: 0, max: 1, value: 0, "aria-label": "Time of the replay" });
-  const clock = html("output", { id: `${id}-clock`, class: "clock" }, "0 s");
+  const clock = html("output", { id: `${id}-clock`, class: "clock" }, "0.00 s");
   const speeds = [["0.1", "× 0.1"], ["0.25", "× 0.25"], ["1", "× 1"], ["4", "× 4"]];
   const speed = html("select", { id: `${id}-speed`, "aria-label": "Speed of the replay" });
   speed.append(...speeds.map(([value, text]) => html("option", { value }, text)));
