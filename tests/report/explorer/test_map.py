@@ -116,7 +116,7 @@ def test_hover_and_click_show_what_is_stored(shown, law, axis):
             of_column = [other for other in cells if sweep.stiffness[other] == sweep.stiffness[cell]]
             if axis == "omega_h":
                 of_column.reverse()
-            page.mouse.move(0, 0)
+            page.wait_for_timeout(400)  # two clicks sooner than that are a double click
             x, y = page.evaluate(_PLACE, [column, of_column.index(cell)])
             page.mouse.move(x, y)
             stored = values_of(sweep, criterion, cell)

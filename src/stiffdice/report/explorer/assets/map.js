@@ -178,7 +178,8 @@ class StabilityMap {
       coloraxis: "coloraxis",
     }));
     const layout = mapLayout(this, traces);
-    const options = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d"] };
+    const unused = ["toImage", "select2d", "lasso2d"];
+    const options = { responsive: true, displaylogo: false, doubleClick: "reset", modeBarButtonsToRemove: unused };
     Plotly.react(this.part.map, [...traces, ...edgeTraces(this, columns), cursorTrace(this)], layout, options);
     this.tick(); // a zoom outlasts a change of law or criterion
     if (!this.clicks) {
