@@ -20,7 +20,8 @@ from stiffdice.simulation.landing import faces_of
 
 # In the order in which they are put together: one strict-mode script, whose functions see each other.
 SCRIPTS = (
-    *("kernel.js", "verdict.js", "landing.js", "charts.js", "replay.js", "throw.js", "die.js", "map.js", "main.js"),
+    *("kernel.js", "verdict.js", "landing.js", "charts.js", "replay.js", "throw.js", "die.js"),
+    *("judge.js", "cells.js", "rerun.js", "map_plots.js", "map.js", "main.js"),
 )
 MOST_BYTES = 4_000_000
 
@@ -34,7 +35,7 @@ _SPREAD = {"velocity_spread": 0.3, "spin_spread": 30.0}
 def build(results: Path) -> str:
     """Return the page of the studies that are stored in a results folder; raises InputError if it is too large."""
     parts = {
-        "STYLE": _asset("style.css"),
+        "STYLE": _asset("style.css") + _asset("map.css"),
         "DATA": _embedded(data_of(results)),
         "PLOTLY": _plotly(),
         "SCRIPT": '"use strict";\n' + "\n".join(_asset(name) for name in SCRIPTS),
