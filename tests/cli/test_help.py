@@ -21,6 +21,9 @@ COMMANDS = [
     "throw",
     "tosses",
     "infer",
+    "new",
+    "plot",
+    "completion",
     "check",
     "inspect",
     "diff",
@@ -67,7 +70,7 @@ def named_by(words: list[str]) -> set[str]:
 def test_every_command_is_held_to_its_examples(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
-    shown = re.findall(r"^    ([a-z]+) ", capsys.readouterr().out, re.MULTILINE)
+    shown = re.findall(r"^    ([a-z]+)(?: |$)", capsys.readouterr().out, re.MULTILINE)
     assert sorted(shown) == sorted(COMMANDS[1:])
 
 
