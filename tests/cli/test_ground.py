@@ -31,16 +31,16 @@ def test_the_block_that_is_printed_is_the_ground_of_a_scene(capsys):
 
 def test_and_back(capsys):
     data = json.loads(told(capsys, *ASKED, "--quick", "--json"))
-    ground = ["--stiffness", repr(data["stiffness"]), "--damping", repr(data["damping"])]
+    ground = ["--stiffness", repr(data["stiffness_kg_per_s2"]), "--damping", repr(data["damping_kg_per_s"])]
     back = json.loads(told(capsys, "ground", *ground, *DIE, "--drop", "0.3", "--quick", "--json"))
     assert back["restitution"] == pytest.approx(0.5, rel=1e-12)
-    assert back["depth"] == pytest.approx(1e-4, rel=1e-12)
+    assert back["depth_m"] == pytest.approx(1e-4, rel=1e-12)
 
 
 @pytest.mark.long
 def test_longest_steps_are_those_of_all_schemes(capsys):
     data = json.loads(told(capsys, *ASKED, "--json"))
-    steps = data["longest_steps"]
+    steps = data["longest_steps_s"]
     assert set(steps) == {"symplectic_euler", "forward_euler", "velocity_verlet", "rk4", "implicit_euler"}
     assert steps["implicit_euler"]["linear"] is None
     assert steps["symplectic_euler"]["restitution_1"] < steps["symplectic_euler"]["restitution_5"]

@@ -90,7 +90,9 @@ def test_examples_name_what_is_there_and_options_that_are(command):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", ["run", pytest.param("advise", marks=pytest.mark.broad), "ground"])
+@pytest.mark.parametrize(
+    "command", ["run", pytest.param("advise", marks=pytest.mark.broad), "ground", "new", "plot", "completion"]
+)
 def test_examples_run(command, tmp_path):
     (tmp_path / "config").symlink_to(ROOT / "config")
     for words in examples(command):

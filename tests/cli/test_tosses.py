@@ -32,7 +32,7 @@ def test_people_and_programs_are_told_and_a_toss_is_drawn(capsys, few, tmp_path)
     assert (tmp_path / "a.gif").read_bytes().startswith(b"GIF8")
     status, out, _ = called(capsys, few, "--json", "--seed", "3")
     found = json.loads(out)
-    assert (status, found["tosses"], found["fitted"], found["contact_time"]) == (0, 6, 2, 0.005)
+    assert (status, found["tosses"], found["fitted"], found["contact_time_s"]) == (0, 6, 2, 0.005)
 
 
 def test_a_file_with_a_gap_is_one_line_and_status_2(capsys, tmp_path):

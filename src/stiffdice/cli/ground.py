@@ -144,7 +144,7 @@ def _told(options: argparse.Namespace, contact: Contact, timestep: float | None)
                 tell(scheme)
                 limits[scheme] = step_limits.limits(contact, scheme)
             lines += ["", *ground_page.limit_lines(limits, contact)]
-            data["longest_steps"] = ground_page.limits_as_data(limits)
+            data["longest_steps_s"] = ground_page.limits_as_data(limits)
         if engine:
             tell(engine)
             ladder = engine_ladder.climbed(engine, contact, timestep)

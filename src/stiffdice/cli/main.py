@@ -136,7 +136,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def called(options: argparse.Namespace) -> int:
     """Call what the parsed options name with them, and return its exit status; errors are one line."""
-    output.QUIET.set(getattr(options, "quiet", False))
+    quiet = output.QUIET.set(getattr(options, "quiet", False))
     try:
         return int(options.call(options) or 0)
     except StiffdiceError as error:
@@ -149,6 +149,8 @@ def called(options: argparse.Namespace) -> int:
         return _failed("not enough memory; keep fewer samples with a larger --every")
     except OSError as error:  # no room for the compiled kernel, say
         return _failed(printable(error))
+    finally:
+        output.QUIET.reset(quiet)
 
 
 def _failed(told: str, status: int = 2) -> int:
