@@ -90,10 +90,10 @@ def keys(data: object, above: str = "") -> set[str]:
         ("ground", "--restitution", "0.5", *DIE),
         ("ground", "--material"),
         ("infer", CONFIG / "measurements" / "labby-2009.yaml", "--response", CONFIG / "nothing.h5"),
-        ("inspect", "a.h5"),
-        ("plot", "a.h5"),
-        ("diff", "a.h5", "a.h5"),
-        ("verify", "a.h5"),
+        pytest.param(("inspect", "a.h5"), marks=pytest.mark.long),
+        pytest.param(("plot", "a.h5"), marks=pytest.mark.long),
+        pytest.param(("diff", "a.h5", "a.h5"), marks=pytest.mark.long),
+        pytest.param(("verify", "a.h5"), marks=pytest.mark.long),
         pytest.param(("throw", "--count", "2"), marks=pytest.mark.long),
         pytest.param(
             ("run", CONFIG / "scenes" / "two-cubes.yaml", "--steps", "100", "-o", "b.h5"), marks=pytest.mark.long
