@@ -32,6 +32,7 @@ PAGES = [
     "docs/explanation/method.md",
     "docs/how-to/advice.md",
     "docs/how-to/ground.md",
+    "docs/how-to/command-line.md",
     "docs/how-to/check.md",
     "docs/explanation/speed.md",
     "docs/explanation/stability.md",

@@ -55,9 +55,8 @@ def test_every_drawing_of_one_file_is_some_files():
     found = set()
     for measure in {entry.measures for entry in DRAWINGS.values() if entry.measures}:
         for kind in ("experiment", "timing"):
-            found |= set(
-                file_figure.drawings_of(xr.Dataset(attrs={"kind": kind, "config": f'{{"measure": "{measure}"}}'}))
-            )
+            told = {"kind": kind, "config": json.dumps({"measure": measure})}
+            found |= set(file_figure.drawings_of(xr.Dataset(attrs=told)))
     run = xr.Dataset({"node_offset": 0.0}, attrs={"kind": "run"})
     found |= set(file_figure.drawings_of(run))
     for stiffness in ([1.0], [1.0, 2.0]):
