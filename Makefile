@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes study status report report-finished report-study archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,10 +62,16 @@ status:  ## how far a study is, what failed and why: make status STUDY=NAME
 	@PYTHON="$(PYTHON)" requirements/install --check
 	@$(BIN)/stiffdice status '$(STUDY)' || [ $$? -ne 2 ]
 
-report: study  ## results/NAME/report.html: every figure with its caption, code and configuration: make report STUDY=NAME
+# Of the study that is named, which is run first; else of those that are finished.
+report: $(if $(filter file,$(origin STUDY)),report-finished,report-study)  ## results/report.html: all finished studies; or run one, into results/NAME/report.html: make report STUDY=NAME
+
+report-finished: install
+	@$(BIN)/snakemake --cores $(CORES) finished --report results/report.html
+
+report-study: study
 	@$(BIN)/snakemake --cores $(CORES) study --config 'study=$(STUDY)' --report 'results/$(STUDY)/report.html'
 
-archive: report  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
+archive: report-study  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
 	@$(BIN)/stiffdice archive '$(STUDY)'
 
 bench: install  ## measure how fast it is, into results/bench/, and compare with the last time

@@ -1,4 +1,16 @@
-# Datasets in, figures and tables out.
+# Datasets in, figures and tables out, and the chapters of their report.
+
+# The order in which a reader meets the studies; the report sorts by name.
+CHAPTERS = {
+    **{"paper": "1 Paper", "tradeoff": "3 Trade", "pair": "5 Pair"},
+    **dict.fromkeys(("stability", "extremes", "refinement", "million"), "2 Stability"),
+    **dict.fromkeys(("landing", "shapes", "tosses"), "4 Dice"),
+    **dict.fromkeys(("engines", "pair-engines", "granular"), "6 Engines"),
+}
+
+
+def chapter(wildcards):
+    return CHAPTERS.get(wildcards.study, "7 Other studies")
 
 
 rule figure:
@@ -9,7 +21,8 @@ rule figure:
         report(
             "results/{study}/figures/{figure}.svg",
             caption="../report/figure.rst",
-            category="{study}",
+            category=chapter,
+            subcategory="{study}",
             labels={"what": "{figure}"},
         ),
         "results/{study}/figures/{figure}.png",
@@ -35,7 +48,8 @@ use rule figure as animation with:
         report(
             "results/{study}/figures/{figure}.gif",
             caption="../report/figure.rst",
-            category="{study}",
+            category=chapter,
+            subcategory="{study}",
             labels={"what": "{figure}"},
         ),
     params:
@@ -48,6 +62,20 @@ use rule figure as animation with:
         "results/{study}/benchmarks/animation/{figure}.tsv"
 
 
+# On demand, as it would make a study with many figures slower.
+use rule figure as pdf with:
+    output:
+        "results/{study}/figures/{figure}.pdf",
+    params:
+        planned=sealed("figure"),
+        dpi=lambda wildcards: study(wildcards.study).dpi,
+        asked=asked_of("pdf", "{figure}"),
+    log:
+        "results/{study}/logs/pdf/{figure}.log",
+    benchmark:
+        "results/{study}/benchmarks/pdf/{figure}.tsv"
+
+
 rule table:
     input:
         not_stale,
@@ -56,7 +84,8 @@ rule table:
         markdown=report(
             "results/{study}/tables/{table}.md",
             caption="../report/table.rst",
-            category="{study}",
+            category=chapter,
+            subcategory="{study}",
             labels={"what": "{table}"},
         ),
         csv="results/{study}/tables/{table}.csv",

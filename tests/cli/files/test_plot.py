@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from stiffdice.cli import common
 from stiffdice.report import file_figure
 from stiffdice.study.catalogue import DRAWINGS
 
@@ -40,6 +41,7 @@ def test_a_figure_lies_beside_its_file(stiffdice, tmp_path, throw):
 def test_ending_and_drawing_can_be_chosen(stiffdice, tmp_path, throw, drawing, ending):
     assert stiffdice("plot", throw, "--draw", drawing, "-o", f"x{ending}", "-q")[0] == 0
     assert (tmp_path / f"x{ending}").read_bytes().startswith(HEADS[ending])
+    assert common._is_our_picture(tmp_path / f"x{ending}")
     if ending == ".svg":
         assert stiffdice("plot", throw, "--draw", drawing, "-q")[3] == ["throw-energy.png", "throw.h5", "x.svg"]
 
