@@ -22,8 +22,7 @@ rule figure:
             "results/{study}/figures/{figure}.svg",
             caption="../report/figure.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{figure}"},
+            labels={"study": "{study}", "what": "{figure}"},
         ),
         "results/{study}/figures/{figure}.png",
     params:
@@ -49,8 +48,7 @@ use rule figure as animation with:
             "results/{study}/figures/{figure}.gif",
             caption="../report/figure.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{figure}"},
+            labels={"study": "{study}", "what": "{figure}"},
         ),
     params:
         planned=sealed("figure"),
@@ -85,8 +83,7 @@ rule table:
             "results/{study}/tables/{table}.md",
             caption="../report/table.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{table}"},
+            labels={"study": "{study}", "what": "{table}"},
         ),
         csv="results/{study}/tables/{table}.csv",
     params:
