@@ -1,16 +1,4 @@
-# Datasets in, figures and tables out, and the chapters of their report.
-
-# The order in which a reader meets the studies; the report sorts by name.
-CHAPTERS = {
-    **{"paper": "1 Paper", "tradeoff": "3 Trade", "pair": "5 Pair"},
-    **dict.fromkeys(("stability", "extremes", "refinement", "million"), "2 Stability"),
-    **dict.fromkeys(("landing", "shapes", "tosses"), "4 Dice"),
-    **dict.fromkeys(("engines", "pair-engines", "granular"), "6 Engines"),
-}
-
-
-def chapter(wildcards):
-    return CHAPTERS.get(wildcards.study, "7 Other studies")
+# Datasets in, figures and tables out.
 
 
 rule figure:
