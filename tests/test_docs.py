@@ -28,6 +28,7 @@ PAGES = [
     "config/README.md",
     "results/README.md",
     "docs/reference/house.md",
+    "docs/reference/figures.md",
     "docs/reference/api.md",
     "docs/explanation/method.md",
     "docs/how-to/advice.md",

@@ -267,5 +267,19 @@ def everything_finished():
     return [file for name in whole for file in everything_of(name)]
 
 
+# The order in which a reader meets the studies; the report sorts by name.
+CHAPTERS = {
+    **{"paper": "1 Paper", "tradeoff": "3 Trade", "pair": "5 Pair"},
+    **dict.fromkeys(("stability", "extremes", "refinement", "million"), "2 Stability"),
+    **dict.fromkeys(("landing", "shapes", "tosses"), "4 Dice"),
+    **dict.fromkeys(("engines", "pair-engines", "granular"), "6 Engines"),
+}
+
+
+def chapter(wildcards):
+    """Return the chapter of the report that a study belongs to."""
+    return CHAPTERS.get(wildcards.study, "7 Other studies")
+
+
 # A mistake in the study asked for is told before anything else is said.
 study(str(config.get("study", "paper")))

@@ -1,16 +1,4 @@
-# Datasets in, figures and tables out, and the chapters of their report.
-
-# The order in which a reader meets the studies; the report sorts by name.
-CHAPTERS = {
-    **{"paper": "1 Paper", "tradeoff": "3 Trade", "pair": "5 Pair"},
-    **dict.fromkeys(("stability", "extremes", "refinement", "million"), "2 Stability"),
-    **dict.fromkeys(("landing", "shapes", "tosses"), "4 Dice"),
-    **dict.fromkeys(("engines", "pair-engines", "granular"), "6 Engines"),
-}
-
-
-def chapter(wildcards):
-    return CHAPTERS.get(wildcards.study, "7 Other studies")
+# Datasets in, figures and tables out.
 
 
 rule figure:
@@ -22,8 +10,7 @@ rule figure:
             "results/{study}/figures/{figure}.svg",
             caption="../report/figure.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{figure}"},
+            labels={"study": "{study}", "what": "{figure}"},
         ),
         "results/{study}/figures/{figure}.png",
     params:
@@ -49,8 +36,7 @@ use rule figure as animation with:
             "results/{study}/figures/{figure}.gif",
             caption="../report/figure.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{figure}"},
+            labels={"study": "{study}", "what": "{figure}"},
         ),
     params:
         planned=sealed("figure"),
@@ -85,8 +71,7 @@ rule table:
             "results/{study}/tables/{table}.md",
             caption="../report/table.rst",
             category=chapter,
-            subcategory="{study}",
-            labels={"what": "{table}"},
+            labels={"study": "{study}", "what": "{table}"},
         ),
         csv="results/{study}/tables/{table}.csv",
     params:

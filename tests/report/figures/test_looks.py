@@ -38,7 +38,7 @@ def test_there_is_a_sample_for_every_drawing():
 @pytest.mark.mpl_image_compare(
     baseline_dir=BASELINE,
     style=style.SETTINGS,
-    savefig_kwargs={"dpi": 60, "metadata": {"Software": None}},
+    savefig_kwargs={"dpi": 36, "metadata": {"Software": None}},
     tolerance=TOLERANCE,
 )
 @pytest.mark.parametrize("name", FIGURES)

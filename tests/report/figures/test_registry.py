@@ -205,7 +205,7 @@ def test_a_file_says_what_it_is_made_from(data, kind, tmp_path):
     assert f"scene {run.attrs['scene_digest'][:16]}" in told
     assert f"code {run.attrs['code_digest'][:16]}" in told
     content = path.read_bytes()
-    assert re.search(rb"stiffdice [0-9.]+; [ -(*-;=-~]*", content)[0] == told.encode()
+    assert re.search(rb"stiffdice [0-9.]+; [ -(*-;=-~]*;", content)[0] == told.encode()
     if kind == "png":
         with Image.open(path) as image:
             assert image.text == {

@@ -77,15 +77,15 @@ def store(
 
 
 def provenance(data: Mapping[str, xr.Dataset], made_from: Mapping[str, str]) -> str:
-    """Return what a figure is made from in one line of ASCII, so that a search through any format's bytes finds it.
+    """Return what a figure is made from in one line of ASCII, which a search through the bytes of any format finds.
 
-    That is our version, `made_from`, and the digests that each dataset tells of itself.
+    It ends with a semicolon. It holds our version, `made_from`, and the digests that each dataset tells of itself.
     """
     parts = [f"stiffdice {__version__}", *(f"{name} {words}" for name, words in made_from.items())]
     for name, found in data.items():
         told = [f"{key.removesuffix('_digest')} {found.attrs[key][:_DIGITS]}" for key in _DIGESTS if key in found.attrs]
         parts.append(f"{name}: {', '.join(told)}" if told else "")
-    return "; ".join(filter(None, parts)).encode("ascii", "backslashreplace").decode("ascii")
+    return "".join(f"{part}; " for part in parts if part).rstrip().encode("ascii", "backslashreplace").decode("ascii")
 
 
 def _metadata(kind: str, title: str, told: str) -> dict[str, str | None]:

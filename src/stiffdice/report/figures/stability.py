@@ -85,8 +85,8 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
             panel.fill_between(stiffness, low, high, color=look["color"], alpha=0.25, linewidth=0)
             panel.plot(stiffness, fit["factor"] * stiffness ** fit["exponent"], color=look["color"], linewidth=0.8)
             digits = 3 if fit["exponent_error"] >= 5e-4 else 4
-            power = rf"$S^{{\,{fit['exponent']:.{digits}f}\pm{fit['exponent_error']:.{digits}f}}}$"
-            notes.append((f"{criterion}: last fail ∝ {power}", look["color"]))
+            power = f"{fit['exponent']:.{digits}f} ± {fit['exponent_error']:.{digits}f}"
+            notes.append((f"{criterion}: last fail ∝ S to the {power}", look["color"]))
     whole = sorted(set(meanings_of(frontier.criterion)) - set(broken))
     notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in whole]
     for k, (note, color) in enumerate(notes):

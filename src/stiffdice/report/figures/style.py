@@ -167,13 +167,13 @@ def new_figure(title: str, width: float = COLUMN, height: float = 2.4) -> Figure
     """Return an empty figure as wide as a column or a page, sizes in inches."""
     figure = Figure(figsize=(width, height))
     text = printable(" ".join(title.split()))  # no formula: a `$` is a `$`
-    figure.suptitle(_wrapped(text, 16 * width), x=0.01, ha="left", color=INK, parse_math=False)
+    figure.suptitle(_wrapped(text, 17 * width), x=0.01, ha="left", color=INK, parse_math=False)
     return figure
 
 
 def add_note(figure: Figure, text: str) -> None:
     """Write a quiet line under the panels, above the legend if there is one, in as many as it takes: what was run."""
-    text = _wrapped(text, 20 * figure.get_figwidth())
+    text = _wrapped(text, 23 * figure.get_figwidth())
     if figure.legends:
         (legend,) = figure.legends
         legend.set_title("\n".join(filter(None, (text, legend.get_title().get_text()))))
@@ -184,11 +184,11 @@ def add_note(figure: Figure, text: str) -> None:
 def add_legend(figure: Figure, handles: Sequence[Any], title: str = "") -> None:
     """Put a legend below all panels, where it covers nothing, in as many columns as there is room for."""
     width = figure.get_figwidth()
-    labels = [_wrapped(str(handle.get_label()), 17 * width - 8) for handle in handles]
+    labels = [_wrapped(str(handle.get_label()), 20 * width - 8) for handle in handles]
     longest = max(len(line) for label in labels for line in label.splitlines())
-    columns = min(len(labels), max(1, int(17.5 * width / (longest + 8))))
+    columns = min(len(labels), max(1, int(22 * width / (longest + 9))))
     look: dict[str, Any] = {"columnspacing": 1.2, "handlelength": 2.2}
-    title = _wrapped(title, 20 * width)
+    title = _wrapped(title, 23 * width)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, title=title, **look)
 
 

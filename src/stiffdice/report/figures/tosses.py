@@ -37,13 +37,13 @@ _VARIANTS: dict[str, dict[str, Any]] = {
     "full": {"color": style.INK, "linewidth": 2.2, "zorder": 4},
     "flight_launch": {"color": style.SKY, "linewidth": 1.8, "zorder": 3},
     "lengths_as_stored": {"color": style.QUIET, "linestyle": ":"},
-    "solid_inertia": {"color": style.GREEN},
-    "corner_inertia": {"color": style.GREEN, "linestyle": "--"},
-    "no_friction": {"color": style.PURPLE},
-    "ungated": {"color": style.LAW_COLORS["ungated"], "linestyle": "-."},
-    "no_rotation": {"color": style.VERMILION},
-    "no_ground": {"color": style.VERMILION, "linestyle": "--"},
-    "stays": {"color": style.QUIET, "linestyle": "--"},
+    "solid_inertia": {"color": style.GREEN, "marker": "s"},
+    "corner_inertia": {"color": style.GREEN, "linestyle": "--", "marker": "P"},
+    "no_friction": {"color": style.PURPLE, "marker": "v"},
+    "ungated": {"color": style.LAW_COLORS["ungated"], "linestyle": "-.", "marker": "o"},
+    "no_rotation": {"color": style.VERMILION, "marker": "D"},
+    "no_ground": {"color": style.VERMILION, "linestyle": "--", "marker": "^"},
+    "stays": {"color": style.QUIET, "linestyle": "--", "marker": "x"},
 }
 _SLOWER = 4  # the animation, than the toss
 
@@ -122,7 +122,7 @@ def over_time(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel, (name, factor, ends) in zip(panels, shown, strict=True):
         for variant, values in zip(meanings_of(found.variant), found[name].values, strict=True):
             label, look = VARIANT_WORDS[variant], _VARIANTS[variant]
-            panel.plot(time, factor * values[long], label=label, **look)
+            panel.plot(time, factor * values[long], label=label, markersize=3, markevery=0.15, **look)
         panel.set(yscale="log", ylim=ends)
     panels[0].set_ylabel("path error [% of the side]")
     panels[1].set(ylabel="orientation error [°]", xlabel="time since the first sample [s]", xlim=(0, time[-1]))
