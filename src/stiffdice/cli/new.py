@@ -58,7 +58,10 @@ def _scene_of(source: str) -> Scene:
     from stiffdice.scene import scene as scenes
 
     if source not in scenes.PRESETS:
-        return scenes.load(common.scene_file(source))
+        try:
+            return scenes.load(common.scene_file(source))
+        except argparse.ArgumentTypeError as error:
+            raise InputError(f"--from {error}") from None
     # The preset `corrected` has the inertia stated; that of corner masses is the paper's words.
     return scenes.from_mapping({"cube": {"inertia": "corners"}} if source == "corrected" else {}, source)
 
@@ -71,6 +74,7 @@ def _write(files: dict[Path, str]) -> None:
     written: list[Path] = []
     try:
         for path, text in files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8") as file:
                 written.append(path)
                 file.write(text)
