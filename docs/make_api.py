@@ -26,7 +26,7 @@ on this page, their parameters and their fields stay as they are within a minor 
 
 def page() -> str:
     """Return the text of docs/reference/api.md."""
-    parts = [_INTRODUCTION, stiffdice.__doc__ or ""]
+    parts = [_INTRODUCTION, stiffdice.__doc__ or "", "<!-- not run from here: signatures -->"]
     for name in stiffdice.__all__:
         parts += [f"## {name}", *_section(name, getattr(stiffdice, name))]
     return "\n\n".join(_reflowed(part) for part in parts) + "\n"
