@@ -31,16 +31,16 @@ def test_the_block_that_is_printed_is_the_ground_of_a_scene(capsys):
 
 def test_and_back(capsys):
     data = json.loads(told(capsys, *ASKED, "--quick", "--json"))
-    ground = ["--stiffness", repr(data["stiffness"]), "--damping", repr(data["damping"])]
+    ground = ["--stiffness", repr(data["stiffness_kg_per_s2"]), "--damping", repr(data["damping_kg_per_s"])]
     back = json.loads(told(capsys, "ground", *ground, *DIE, "--drop", "0.3", "--quick", "--json"))
     assert back["restitution"] == pytest.approx(0.5, rel=1e-12)
-    assert back["depth"] == pytest.approx(1e-4, rel=1e-12)
+    assert back["depth_m"] == pytest.approx(1e-4, rel=1e-12)
 
 
 @pytest.mark.long
 def test_longest_steps_are_those_of_all_schemes(capsys):
     data = json.loads(told(capsys, *ASKED, "--json"))
-    steps = data["longest_steps"]
+    steps = data["longest_steps_s"]
     assert set(steps) == {"symplectic_euler", "forward_euler", "velocity_verlet", "rk4", "implicit_euler"}
     assert steps["implicit_euler"]["linear"] is None
     assert steps["symplectic_euler"]["restitution_1"] < steps["symplectic_euler"]["restitution_5"]
@@ -51,7 +51,7 @@ def test_longest_steps_are_those_of_all_schemes(capsys):
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet", "drake"])
 @pytest.mark.long
 def test_an_engine_is_told(engine, capsys):
-    asked = [*ASKED, "--quick", "--engine", engine, "--timestep", "10 us"]
+    asked = [*ASKED, "--quick", "--engine", engine, "--dt", "10 us"]
     data = json.loads(told(capsys, *asked, "--json"))
     assert data["parameters"]["paste"] in told(capsys, *asked)
     assert any(column["kind"] == "predicted" for column in data["engine"]["columns"])
@@ -73,10 +73,10 @@ def test_a_material_is_a_restitution_with_a_source(capsys):
         (["--restitution", "0.5", "--depth", "1 mm", "--speed", "1", "--side", "1 cm"], "--mass: is needed"),
         (["--restitution", "0.5", "--depth", "1 mm", *DIE], "--speed and --drop: needed is one of them"),
         ([*ASKED[1:], "--speed", "1"], "--speed and --drop: needed is one of them"),
-        ([*ASKED[1:], "--law", "ungated"], "--drop: allowed with --law gated"),
+        ([*ASKED[1:], "--contact", "ungated"], "--drop: allowed with --contact gated"),
         ([*ASKED[1:], "--gravity", "0"], "--gravity = 0: allowed beside --drop"),
         ([*ASKED[1:], "--engine", "mujoko"], "--engine = mujoko: allowed is mujoco or pybullet or drake; did you mean"),
-        ([*ASKED[1:], "--timestep", "1e-5"], "--timestep: allowed is beside --engine only"),
+        ([*ASKED[1:], "--dt", "1e-5"], "--dt: allowed is beside --engine only"),
         ([*ASKED[1:], "--material", "granite"], "--material: is a restitution; give no other"),
         (
             [*DIE, "--stiffness", "2e5", "--damping", "1e300", "--speed", "1"],

@@ -21,6 +21,9 @@ COMMANDS = [
     "throw",
     "tosses",
     "infer",
+    "new",
+    "plot",
+    "completion",
     "check",
     "inspect",
     "diff",
@@ -67,7 +70,7 @@ def named_by(words: list[str]) -> set[str]:
 def test_every_command_is_held_to_its_examples(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
-    shown = re.findall(r"^    ([a-z]+) ", capsys.readouterr().out, re.MULTILINE)
+    shown = re.findall(r"^    ([a-z]+)(?: |$)", capsys.readouterr().out, re.MULTILINE)
     assert sorted(shown) == sorted(COMMANDS[1:])
 
 
@@ -87,7 +90,9 @@ def test_examples_name_what_is_there_and_options_that_are(command):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", ["run", pytest.param("advise", marks=pytest.mark.broad), "ground"])
+@pytest.mark.parametrize(
+    "command", ["run", pytest.param("advise", marks=pytest.mark.broad), "ground", "new", "plot", "completion"]
+)
 def test_examples_run(command, tmp_path):
     (tmp_path / "config").symlink_to(ROOT / "config")
     for words in examples(command):

@@ -72,7 +72,7 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", SCENE, "-o", "nowhere/out.h5"], "the folder nowhere does not exist"),
         (["run", SCENE, "-o", "."], "is a folder"),
         (["run", SCENE, "-o", "/dev/null"], "not a regular file"),
-        (["run", SCENE, "-o", SCENE], "is the scene itself"),
+        (["run", SCENE, "-o", SCENE], "is the input itself"),
         (["run", SCENE, "-o", "out.h5", "--set", "cube=[1"], "--set cube=[1: line 1: not valid YAML"),
         (["run", SCENE], "required: -o"),
         (["run", SCENE, "-o", "out.h5", "--simulator", "dice"], "simulator = dice: allowed is stiffdice or mujoco"),
@@ -96,11 +96,11 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["run", SCENE, "-o", "out.h5", "--preset", "wrong"], "preset = wrong: allowed is as_listed or"),
         (["run", SCENE, "-o", "out.h5", "--set", "ground.stifness=1"], "did you mean stiffness?"),
         (["run", SCENE, "-o", "out.h5", "--set", "cube.mass=-1"], "cube.mass = -1: allowed is a finite number > 0"),
-        (["run", SCENE, "-o", "out.h5", "--quickly"], "run: unrecognized arguments: --quickly (see stiffdice run"),
+        (["run", SCENE, "-o", "out.h5", "--hastily"], "run: unrecognized arguments: --hastily (see stiffdice run"),
         (["run", SCENE, "-o", "out.h5", "--stpes", "5"], "unrecognized arguments: --stpes; did you mean --steps?"),
         (["run", SCENE, "--outptu=out.h5"], "unrecognized arguments: --outptu=out.h5; did you mean --output?"),
         (["--verzion"], "stiffdice: unrecognized arguments: --verzion; did you mean --version?"),
-        (["fly"], "invalid choice: 'fly'"),
+        (["fly"], "stiffdice: fly: no such command; allowed is run, advise"),
         (["run", SCENE, "--\x1b[2J\u202e\nx"], r"unrecognized arguments: --\x1b[2J\u202e\nx (see stiffdice run"),
         (["run", SCENE, "--set", "a\x1b\nb c"], r"argument --set: a\x1b\nb c: write"),
         (["rnu", SCENE], "did you mean run?"),
@@ -119,7 +119,7 @@ def test_a_run_that_fails_is_a_result(stiffdice, change, verdict):
         (["advise", "--damping", "1", "--restitution", "0.5"], "--restitution: not allowed with argument --damping"),
         (["advise", "--error", "0,1%"], "--error = 0,1%: a decimal comma is not read; write 0.1%"),
         (["advise", "--horizon", "5 g"], "--horizon = 5 g: g is no unit of [s]"),
-        ([], "required: COMMAND"),
+        ([], "stiffdice: a command is missing; allowed is run, advise"),
         (["inspect", "nowhere.h5"], "nowhere.h5: No such file"),
         (["inspect", SCENE], "not a readable HDF5 file"),
     ],
@@ -186,7 +186,7 @@ def test_a_users_own_file_is_replaced_only_if_asked(stiffdice, tmp_path):
     assert stiffdice(*run, "notes.txt")[0] == 0, "a file of stiffdice is replaced"
     (tmp_path / "empty").touch()
     assert stiffdice(*run, "empty")[0] == 0, "there is nothing to lose"
-    assert "is the scene itself" in stiffdice(*run, SCENE, "--force")[2]
+    assert "is the input itself" in stiffdice(*run, SCENE, "--force")[2]
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def test_every_option_is_heard(stiffdice):
         (["--scheme", "evnt"], "scheme = evnt: allowed is .*; did you mean event"),
         (["--model", "tumbling"], "--model = tumbling: allowed is pair for two cubes, or nothing"),
         (["--ledger", "--scheme", "rk4"], "--ledger: scheme = rk4: allowed is symplectic_euler"),
-        (["--animate", "two.mp4"], r"--animate = two.mp4: allowed is a name that ends with \.gif"),
+        (["--animate", "two.mp4"], r"--animate = two.mp4: allowed is the name of a file that ends in \.gif"),
         (["--animate", "no/two.gif"], "the folder no does not exist"),
         (["--every", "20000"], "every = 20000: allowed is a whole number from 1 to 10000"),
         (["--set", "cubes.1.launch.velocity=[1, 0]"], r"two-cubes\.yaml: cubes\.1\.launch\.velocity = \[1, 0\]: allow"),

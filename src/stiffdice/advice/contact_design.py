@@ -85,24 +85,24 @@ class Contact:
         }
 
     def as_data(self) -> dict[str, Any]:
-        """Return all numbers, in SI units."""
+        """Return all numbers, with their units in the keys."""
         ground, cube = self.scene.ground, self.scene.cube
         return {
-            "law": self.law,
-            "mass": cube.mass,
-            "side": cube.side,
-            "speed": self.speed,
-            "gravity": self.scene.gravity,
-            "stiffness": ground.stiffness,
-            "damping": ground.damping,
+            "contact": self.law,
+            "mass_kg": cube.mass,
+            "side_m": cube.side,
+            "speed_m_per_s": self.speed,
+            "gravity_m_per_s2": self.scene.gravity,
+            "stiffness_kg_per_s2": ground.stiffness,
+            "damping_kg_per_s": ground.damping,
             "restitution": self.restitution,
             "restitution_with_weight": self.restitution_with_weight,
             "zeta": self.zeta,
-            "omega": self.omega,
-            "contact_time": self.contact_time,
-            "depth": self.depth,
-            "depth_at_rest": self.depth_at_rest,
-            "peak_force": self.peak_force,
+            "omega_rad_per_s": self.omega,
+            "contact_time_s": self.contact_time,
+            "depth_m": self.depth,
+            "depth_at_rest_m": self.depth_at_rest,
+            "peak_force_n": self.peak_force,
         }
 
 

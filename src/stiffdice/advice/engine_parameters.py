@@ -165,5 +165,5 @@ def check(contact: Contact) -> None:
     """Raise InputError for a contact law that engines do not have."""
     if contact.law != "gated":
         raise InputError(
-            f"--law = {contact.law}: allowed with --engine is gated, as no engine's ground acts in the air"
+            f"--contact = {contact.law}: allowed with --engine is gated, as no engine's ground acts in the air"
         )

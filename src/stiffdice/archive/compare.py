@@ -11,7 +11,7 @@ import json
 import tempfile
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -118,18 +118,21 @@ class Comparison:
         return json.dumps(json.loads(json.dumps(content), parse_constant=lambda name: repr(float(name))), indent=2)
 
 
-def compare(a: Path, b: Path, all_files: bool = False) -> Comparison:
+def compare(
+    a: Path, b: Path, all_files: bool = False, progress: Callable[[float], None] = lambda _: None
+) -> Comparison:
     """Return how two files of ours, two folders or two archives (zip) differ; an archive is a folder, too.
 
     all_files: whether side files (logs, times, the report, what else differs from one rebuild to the next) count.
-    Raises InputError if one is not there, is no file of ours, or if a file is to be compared with a folder.
+    progress: takes the fraction done. Raises InputError if one is not there, is no file of ours, or if a file is to be
+    compared with a folder.
     """
     with ExitStack() as stack:
         left, right = (_unpacked(path, stack) for path in (a, b))
         if left.is_dir() != right.is_dir():
             raise InputError(f"{a}, {b}: a folder and a file; allowed are two files, two folders, two archives")
         if left.is_dir():
-            return _folders((left, right), all_files)
+            return _folders((left, right), all_files, progress)
         difference = data_difference(left.name, [open_file(left)], [open_file(right)])
         identical = int(filecmp.cmp(left, right, shallow=False))
     return Comparison(() if difference.same else (difference,), files=1, identical=identical)
@@ -149,14 +152,18 @@ def _unpacked(path: Path, stack: ExitStack) -> Path:
     return folder
 
 
-def _folders(tops: tuple[Path, Path], all_files: bool) -> Comparison:
+def _folders(tops: tuple[Path, Path], all_files: bool, progress: Callable[[float], None]) -> Comparison:
     found = [{name for name, _ in manifest.files_in(top)} for top in tops]
     one, other = found
     if not all_files:
         # Only one of the two may know what shows timings.
         side = set[str]().union(*map(_side, tops, found))
         one, other = (files - side - set(unlisted(top, files)) for top, files in zip(tops, found, strict=True))
-    both = {name for name in one & other if _are_equal(tops[0] / name, tops[1] / name)}
+    both, shared = set(), one & other
+    for number, name in enumerate(shared):
+        progress(number / len(shared) / 2)  # then those that are not byte for byte the same
+        if _are_equal(tops[0] / name, tops[1] / name):
+            both.add(name)
     shards, others = shards_of(one), shards_of(other)
     # What is compared with what, by one name: all shards of a sweep with those of the same sweep, a file with a file.
     pairs: dict[str, Pair] = {}
@@ -168,7 +175,10 @@ def _folders(tops: tuple[Path, Path], all_files: bool) -> Comparison:
     pairs |= {name: ([name], [name]) for name in (one & other) - told}
     data = (top / name for pair in pairs.values() for top, names in zip(tops, pair, strict=True) for name in names)
     refused = isolation.refused(path for path in data if path.suffix == ".h5" and is_regular(path))
-    parts = [_difference(name, pair, tops, refused) for name, pair in pairs.items()]
+    parts = []
+    for number, (name, pair) in enumerate(pairs.items()):
+        progress((1 + number / len(pairs)) / 2)
+        parts.append(_difference(name, pair, tops, refused))
     return Comparison(
         tuple(sorted((part for part in parts if not part.same), key=lambda part: (not part.numbers, part.name))),
         only_a=tuple(sorted(one - other - told)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import stat
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile, ZipInfo
@@ -27,10 +28,17 @@ class Packed(NamedTuple):
     sizes: Sizes
 
 
-def pack(study: Study, root: Path, target: str | Path, agent: str | None = None) -> Packed:
+def pack(
+    study: Study,
+    root: Path,
+    target: str | Path,
+    agent: str | None = None,
+    progress: Callable[[float], None] = lambda _: None,
+) -> Packed:
     """Pack a finished study, with the project in `root` that made it, into a zip file: an RO-Crate.
 
-    agent: who ran it, if that is to be said. Equal files with equal times give equal bytes (under one version of zlib).
+    agent: who ran it, if that is to be said. progress: takes the fraction done, by bytes packed.
+    Equal files with equal times give equal bytes (under one version of zlib).
     Raises InputError naming the first file that is missing, damaged or cannot be packed, and OutputError if the archive
     cannot be stored; nothing is left then.
     """
@@ -43,8 +51,11 @@ def pack(study: Study, root: Path, target: str | Path, agent: str | None = None)
         folders = {folder for name in digests for folder in PurePosixPath(name).parents} - {PurePosixPath()}
         for folder in sorted(f"{folder}/" for folder in folders):
             archive.writestr(_info(folder, stat.S_IFDIR | 0o755, ZIP_STORED), b"")
+        whole_size, done = sum(file.source.stat().st_size for file in files), 0
         for file in files:
+            progress(done / max(1, whole_size))
             _add(archive, file, digests[file.path])
+            done += archive.getinfo(file.path).file_size
         facts = crate.Facts(
             study,
             crate.Citation.load(root / "CITATION.cff"),

@@ -6,11 +6,13 @@ before anything is executed.
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
@@ -43,6 +45,7 @@ _CODE = ("Snakefile", "src", "workflow")
 _VERSION = re.compile(r'^__version__ = "([0-9A-Za-z.+-]{1,40})"', re.MULTILINE)
 
 _LOG_READ = 1 << 20  # bytes at the end of a log
+_LOOK = 1.0  # s between two looks at what has been made
 
 
 class RunError(StiffdiceError):
@@ -132,6 +135,19 @@ class Rebuilt(NamedTuple):
             lines.append(f"it lies in {unpacked.folder}: the archive in {ARCHIVED}, what was made again in {REBUILT}")
         return [printable(line) for line in lines]
 
+    def as_json(self) -> str:
+        """Return it for programs: how the results compare, as `Comparison.as_json` has it, and what made them."""
+        content = {
+            "archive": self.unpacked.archive,
+            "study": self.unpacked.study,
+            "ok": self.ok,
+            "code_is_installed": self.unpacked.code.is_installed,
+            "folder": str(self.unpacked.folder) if self.unpacked.kept else None,
+            "comparison": json.loads(self.found.as_json()),
+            "notes": self.notes,
+        }
+        return json.dumps(content, indent=2)
+
 
 @contextmanager
 def opened(archive: str | Path, folder: str | Path | None = None) -> Iterator[Opened]:
@@ -183,15 +199,15 @@ def way_of(unpacked: Opened, in_sandbox: bool = True) -> Way:
     return sandbox.unconfined(unpacked.folder / REBUILT)
 
 
-def rebuild(unpacked: Opened, way: Way, cores: int = 1) -> Rebuilt:
+def rebuild(unpacked: Opened, way: Way, cores: int = 1, progress: Callable[[float], None] = lambda _: None) -> Rebuilt:
     """Make the results of an archive again, where there are none, and compare them with the archive's own.
 
     It executes the archive's own code, unless that is the installed. Python and libraries are those of this process.
-    Raises RunError with the run's last lines if that fails.
+    progress: takes the fraction of the results that are made. Raises RunError with the run's last lines if that fails.
     """
     notes = other_versions(unpacked.folder / ARCHIVED / "requirements" / "requirements.lock")
     _fill(unpacked)
-    notes += [line for line in _run(unpacked, way, cores) if "left out:" in line]
+    notes += [line for line in _run(unpacked, way, cores, progress) if "left out:" in line]
     archived, made = (unpacked.folder.resolve() / top / "results" / unpacked.study for top in (ARCHIVED, REBUILT))
     if made.resolve() != made:  # a link, to the archive's own perhaps
         made = unpacked.folder / _NOTHING
@@ -270,7 +286,7 @@ def _fill(unpacked: Opened) -> None:
             shutil.copy(unpacked.folder / ARCHIVED / name, target)
 
 
-def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
+def _run(unpacked: Opened, way: Way, cores: int, progress: Callable[[float], None]) -> list[str]:
     """Run the workflow and return what it said; raises RunError. Nothing that it started goes on afterwards."""
     command = [sys.executable, "workflow/run.py", "--cores", str(cores), "study"]
     command += ["--workflow-profile", "workflow/profiles/default", "--config", f"study={unpacked.study}"]
@@ -278,7 +294,10 @@ def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
     with log.open("wb") as out:
         running = sandbox.start(way, command, unpacked.folder / REBUILT, out)
         try:
-            running.wait()
+            while running.poll() is None:
+                progress(_made(unpacked))
+                with suppress(subprocess.TimeoutExpired):
+                    running.wait(_LOOK)
         finally:
             sandbox.end(running)
     with log.open("rb") as file:
@@ -289,3 +308,9 @@ def _run(unpacked: Opened, way: Way, cores: int) -> list[str]:
         told = f"{unpacked.archive}: its run failed{where}, exit status {running.returncode}:"
         raise RunError(told, lines[-LAST_LINES:])
     return lines
+
+
+def _made(unpacked: Opened) -> float:
+    """Return which fraction of the archive's results has been made again."""
+    wanted = [name for name in unpacked.listed if name.startswith(f"results/{unpacked.study}/")]
+    return sum((unpacked.folder / REBUILT / name).exists() for name in wanted) / max(1, len(wanted))

@@ -6,7 +6,7 @@ import json
 import re
 import tempfile
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path, PurePosixPath
@@ -97,25 +97,25 @@ def _counted(what: str, number: int) -> str:
     return f"{number} {words.removesuffix('s') if number == 1 else words}"
 
 
-def verify(path: str | Path) -> Report:
+def verify(path: str | Path, progress: Callable[[float], None] = lambda _: None) -> Report:
     """Return what was checked of an archive (zip or unpacked), a folder of results or an HDF5 file, and what fails.
 
     Checked are digests, both ways, where there is a manifest; the crate's description; and of every HDF5 file its seal
     and checksums, its structure, its schema and whether its numbers can be (`consistency`), of a sweep also whether its
     shards add up to it and its frontier follows from it. A zip file is unpacked into a temporary folder. Raises
-    InputError if there is nothing to check, or a zip file that must not be unpacked.
+    InputError if there is nothing to check, or a zip file that must not be unpacked. progress: takes the fraction done.
     """
     place, damaged = Path(path), dict[str, str]()
     if place.is_dir():
         is_archive = (place / manifest.NAME).is_file()
         report = Report(str(path), "unpacked archive" if is_archive else "folder of results")
-        _check_folder(report, place, is_archive, damaged)
+        _check_folder(report, place, is_archive, damaged, progress)
         return report
     if not place.is_file():
         raise InputError(f"{path}: {'not a file or folder' if place.exists() else 'No such file or folder'}")
     if h5py.is_hdf5(path):
         report = Report(str(path), "file")
-        _Files(report, {place.name: place}, {}).check_all()
+        _Files(report, {place.name: place}, {}, progress).check_all()
         return report
     report = Report(str(path), "archive")
     with tempfile.TemporaryDirectory(prefix="stiffdice-verify-") as temporary:
@@ -123,11 +123,13 @@ def verify(path: str | Path) -> Report:
         unzip(place, folder, damaged)
         if not (folder / manifest.NAME).is_file() and manifest.NAME not in damaged:
             raise RefusedError(f"{path}: has no {manifest.NAME}; not an archive of stiffdice")
-        _check_folder(report, folder, True, damaged)
+        _check_folder(report, folder, True, damaged, progress)
     return report
 
 
-def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mapping[str, str]) -> None:
+def _check_folder(
+    report: Report, folder: Path, is_archive: bool, damaged: Mapping[str, str], progress: Callable[[float], None]
+) -> None:
     """Check a folder of results, or an archive's; raises InputError if there is nothing to check."""
     files = {}
     for name, path in manifest.files_in(folder):
@@ -150,7 +152,7 @@ def _check_folder(report: Report, folder: Path, is_archive: bool, damaged: Mappi
         report.note(f"digests (there is no {manifest.NAME})")
         _check_asked(report, folder, files)
     _check_measurements(report, {name: path for name, path in files.items() if name.startswith(_MEASUREMENTS)})
-    _Files(report, data, files).check_all()
+    _Files(report, data, files, progress).check_all()
 
 
 def _is_result(name: str) -> bool:
@@ -239,8 +241,14 @@ class _Files:
     that crashes it, or takes it too long, is not opened here.
     """
 
-    def __init__(self, report: Report, data: Mapping[str, Path], files: Mapping[str, Path]) -> None:
-        self._report, self._data, self._files = report, data, files
+    def __init__(
+        self,
+        report: Report,
+        data: Mapping[str, Path],
+        files: Mapping[str, Path],
+        progress: Callable[[float], None],
+    ) -> None:
+        self._report, self._data, self._files, self._progress = report, data, files, progress
         self._unread: set[str] = set()
         self._refused = isolation.refused(data.values())
 
@@ -304,6 +312,7 @@ class _Files:
         """Yield a file's dataset, of a shard part by part, checked; if it cannot be read to its end, the file fails."""
         path, cells, report = self._data[name], 0, self._report
         is_shard = PurePosixPath(name).parent.name == SHARDS
+        self._progress(report.checked["hdf5_files"] / len(self._data))
         report.checked["hdf5_files"] += 1
         try:
             if str(path) in self._refused:

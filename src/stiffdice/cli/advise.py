@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from stiffdice.cli import common
-from stiffdice.errors import InputError, printable
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
+from stiffdice.errors import InputError
 from stiffdice.scene import validation
 
 if TYPE_CHECKING:
@@ -31,48 +32,50 @@ values. Exit status: 0 for an advice, with --run for a promise kept; 1 if nothin
 broken; 2 for bad input.
 """
 
-# Keys of the scene that `advise` has an option for, and what they are.
+# Keys of the scene that `advise` has an option for, and what they are, unless other commands have that option, too.
 _KEYS = {
-    "stiffness": ("ground.stiffness", "of the ground, per node [kg/s²]"),
-    "contact_time": ("ground.contact_time", "with --restitution, in place of a stiffness: of a flat landing [s]"),
-    "damping": ("ground.damping", "of the ground, per node [kg/s]"),
-    "restitution": ("ground.restitution", "in place of a damping: speed up over speed down of a flat landing"),
+    "stiffness": ("ground.stiffness", ""),
+    "contact_time": ("ground.contact_time", ", with --restitution, in place of a stiffness"),
+    "damping": ("ground.damping", ""),
+    "restitution": ("ground.restitution", ", in place of a damping"),
     "friction": ("ground.friction", "coefficient of friction"),
-    "contact": ("ground.contact", "ungated or gated"),
-    "mass": ("cube.mass", "of the cube [kg]"),
+    "contact": ("ground.contact", ""),
+    "mass": ("cube.mass", ""),
     "radius": ("cube.radius", "of the cube, centre to corner [m]"),
-    "side": ("cube.side", "of the cube, in place of its radius [m]"),
+    "side": ("cube.side", ", in place of its radius"),
     "position": ("launch.position", "where the centre starts, as 0,0,3 [m]"),
     "velocity": ("launch.velocity", "of the launch, as 5,0,5 [m/s]"),
     "spin": ("launch.angular_momentum", "angular momentum of the launch, as 0.1,0,0 [kg m²/s]"),
     "duration": ("duration", "of the run [s]"),
 }
-_PURPOSES = ("path", "landing")
+PURPOSES = ("path", "landing")
 _VECTORS = ("position", "velocity", "spin")
 _EITHER = (("stiffness", "contact_time"), ("damping", "restitution"), ("radius", "side"))
 
 
 def add(advise: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    told = "the physical problem; without it, the options below"
-    advise.add_argument("scene", metavar="SCENE.yaml", nargs="?", help=told)
+    grammar.add_scene(advise, " (default: the options below)")
+    grammar.add(advise, "--output", ", an .h5 file; with --run")
     told = "as 1%%, 0.01 or 1e-6 of the radius, or '1 mm' (default: 1%%)"
     advise.add_argument("--error", default="1%", metavar="X", help=told)
     told = "path, or landing: the faces of a die (default: path)"
-    advise.add_argument("--for", dest="purpose", default="path", metavar="WHAT", help=told)
-    advise.add_argument("--horizon", metavar="T", help="until when to keep it [s] (default: the duration)")
-    advise.add_argument("--scheme", metavar="NAME", help="advice for this scheme alone (default: all are compared)")
+    advise.add_argument("--for", dest="purpose", default="path", metavar="PURPOSE", help=told)
+    advise.add_argument("--horizon", metavar="X", help="until when to keep it [s] (default: the duration)")
+    grammar.add(advise, "--scheme", ": advice for this one alone (default: all are compared)")
     told = "do it, and check the promise against a run of twice the cost and another method"
     advise.add_argument("--run", action="store_true", help=told)
-    advise.add_argument("-o", "--output", metavar="OUT.h5", help="with --run: the file to write")
-    advise.add_argument("--json", action="store_true", help="the same for programs")
-    advise.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
-    common.add_changes(advise)
+    grammar.add_changes(advise)
+    grammar.add(advise, "--force")
+    grammar.add_form(advise)
     scene = advise.add_argument_group("the scene in numbers, in place of a file or on top of it")
     either = {name: group for names in _EITHER for group in [scene.add_mutually_exclusive_group()] for name in names}
     for name, (_, text) in _KEYS.items():
-        metavar = "X,Y,Z" if name in _VECTORS else "LAW" if name == "contact" else "X"
-        either.get(name, scene).add_argument(f"--{name.replace('_', '-')}", metavar=metavar, help=text)
+        option, group = f"--{name.replace('_', '-')}", either.get(name, scene)
+        if option in grammar.OPTIONS:
+            grammar.add(group, option, text)
+        else:
+            group.add_argument(option, metavar="X,Y,Z" if name in _VECTORS else "X", help=text)
 
 
 def _in_radii(text: str, scene: Scene) -> str:
@@ -109,7 +112,7 @@ def call(options: argparse.Namespace) -> int:
     changes += options.overrides
     file, preset = options.scene, options.preset
     scene = scenes.load(file, changes, preset) if file is not None else scenes.changed({}, changes, preset)
-    if validation.choice("--for", options.purpose, _PURPOSES) == "landing":
+    if validation.choice("--for", options.purpose, PURPOSES) == "landing":
         return _for_landing(options, scene)
     horizon = None if options.horizon is None else common.number("--horizon", options.horizon, "s")
     target = None
@@ -143,11 +146,10 @@ def call(options: argparse.Namespace) -> int:
     if options.json:
         print(advice_page.as_json(given, check))
     else:
-        for line in scene.derived:
-            print(line)
-        print(advice_page.as_text(given, common.scene_words(options, changes) if file else []))
+        output.say([*scene.derived, advice_page.as_text(given, common.scene_words(options, changes) if file else [])])
         if check is not None:
-            print("\n" + advice_page.check_as_text(check))
+            output.say(["", advice_page.check_as_text(check)])
             if target is not None:
-                print(printable(f"{target}: {Verdict(run.verdict[0]).sentence}"))
+                verdict = Verdict(run.verdict[0])
+                output.say_verdict([f"{target}: {verdict.sentence}"], str(target), verdict)
     return 0 if given.best is not None and (check is None or check.kept) else 1

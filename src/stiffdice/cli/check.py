@@ -6,7 +6,8 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 
 HELP = "say what a MuJoCo model's contacts do at its time step, and what to change"
 EXAMPLES = """\
@@ -26,19 +27,20 @@ nothing is wrong, 1 for a verdict, 2 for what cannot be checked.
 def add(check: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     check.add_argument("model", metavar="MODEL.xml", type=Path, help="a model in MuJoCo's MJCF")
-    form = check.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="the same for programs")
-    form.add_argument("--patch", action="store_true", help="print what to change, and nothing else: for patch -p0")
-    told = "draw restitution and energy against the time step: .png or .svg"
+    told = "draw restitution and energy against the time step, too: .png or .svg"
     check.add_argument("--figure", metavar="FILE.png", help=told)
-    check.add_argument("--force", action="store_true", help="replace a file that is there")
+    grammar.add(check, "--force")
+    form = check.add_mutually_exclusive_group()
+    form.add_argument("--patch", action="store_true", help="print what to change, and nothing else: for patch -p0")
+    grammar.add(form, "--json")
+    grammar.add_form(check, json=False)
 
 
 def call(options: argparse.Namespace) -> int:
     """Print what was found; 1 if anything is wrong."""
     figure = None
     if options.figure is not None:
-        figure = _figure(options.figure, options.force, str(options.model))
+        figure = common.picture_target("--figure", options.figure, [".png", ".svg"], options.force, options.model)
     # These take a while to import.
     from stiffdice.advice import model_check
     from stiffdice.cli.terminal.progress import notes
@@ -59,14 +61,5 @@ def call(options: argparse.Namespace) -> int:
     if options.patch:
         print((advice and advice.patch) or "", end="")
     else:
-        print(model_page.as_json(found, advice) if options.json else model_page.as_text(found, advice))
+        output.say(model_page.as_json(found, advice) if options.json else model_page.as_text(found, advice))
     return 0 if found.passed else 1
-
-
-def _figure(text: str, force: bool, model: str) -> Path:
-    """Return the file to draw into; raises InputError for another ending, and for what is there already."""
-    from stiffdice.errors import InputError
-
-    if Path(text).suffix not in (".png", ".svg"):
-        raise InputError(f"--figure = {text}: allowed are files that end in .png or .svg")
-    return common.target_of(text, force, lambda _: False, *([model] if Path(model).is_file() else []))

@@ -1,4 +1,4 @@
-"""What the commands have in common: numbers as people type them, changes of a scene, studies, targets."""
+"""What the commands have in common: numbers as people type them, scenes, studies, targets."""
 
 from __future__ import annotations
 
@@ -53,27 +53,10 @@ def steps_of(text: str, duration: float) -> tuple[int, str]:
     return steps, f"{count} of {duration / steps:.9g} s: {asked:g} s does not divide the duration, {duration:g} s"
 
 
-def add_changes(command: argparse.ArgumentParser) -> None:
-    """Add the options that change a scene, the same for all commands that take one."""
-    command.add_argument("--preset", metavar="P", help="as_listed, as_written or corrected: defaults of the physics")
-    told = "set one key of the scene; may be given more than once"
-    command.add_argument(
-        "--set", dest="overrides", action="append", default=[], metavar="KEY.PATH=VALUE", type=_change, help=told
-    )
-
-
 def scene_words(options: argparse.Namespace, changes: Sequence[str]) -> list[str]:
     """Return the arguments that name the same scene to another command, with changes as `key.path=value`."""
     preset = [] if options.preset is None else ["--preset", options.preset]
     return [options.scene, *preset, *(word for change in changes for word in ("--set", change))]
-
-
-def _change(text: str) -> str:
-    """Return a change of a scene; raises ArgumentTypeError where a blank parts its key from its value."""
-    key, equals, value = text.partition("=")
-    if not equals or (key and not value):
-        raise argparse.ArgumentTypeError(f"{text}: write --set {key or 'ground.stiffness'}=VALUE, no blank about the =")
-    return text
 
 
 def check_folder() -> None:
@@ -92,7 +75,7 @@ def study_of(name: str) -> Study:
     return config.load(f"config/{name}.yaml", SCHEMA)
 
 
-def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources: str) -> Path:
+def target_of(text: str | Path, force: bool, is_ours: Callable[[Path], bool], *sources: str | Path) -> Path:
     """Return the path of a file to write, named with -o.
 
     is_ours: whether a file that is there may be replaced. sources: files that are read. Raises InputError for one of
@@ -101,8 +84,23 @@ def target_of(text: str, force: bool, is_ours: Callable[[Path], bool], *sources:
     from stiffdice.io.writer import check_target
 
     target = check_target(text)
-    if target.exists() and any(target.samefile(source) for source in sources):
-        raise InputError(f"{target}: is the scene itself; name another file for the output")
+    if target.exists() and any(Path(source).exists() and target.samefile(source) for source in sources):
+        raise InputError(f"{target}: is the input itself; name another file for the output")
     if force or not target.exists() or target.stat().st_size == 0 or is_ours(target):
         return target
     raise InputError(f"{target}: is there already, and no such file of stiffdice; name another, or add --force")
+
+
+def picture_target(option: str, text: str | Path, endings: Sequence[str], force: bool, *sources: str | Path) -> Path:
+    """Return the path of a picture to write, as `target_of`; raises InputError for an ending not among these, too."""
+    if Path(text).suffix not in endings:
+        allowed = f"{', '.join(endings[:-1])} or {endings[-1]}" if len(endings) > 1 else endings[0]
+        raise InputError(f"{option} = {text}: allowed is the name of a file that ends in {allowed}")
+    return target_of(text, force, _is_our_picture, *sources)
+
+
+def _is_our_picture(path: Path) -> bool:
+    """Return whether a picture says in its first bytes that stiffdice drew it; a GIF has no room for that."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    return head.startswith((b"GIF87a", b"GIF89a")) or b"stiffdice" in head

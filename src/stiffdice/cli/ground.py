@@ -6,7 +6,8 @@ import argparse
 import math
 from typing import TYPE_CHECKING, Any
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,17 +28,17 @@ Longest steps are measured in some seconds; --quick leaves them out. --engine ad
 restitution predicted at each timestep and, where the engine is installed, measured (docs/how-to/ground.md).
 """
 
-# Options that are numbers: what they are, and their unit.
+# Options that are numbers: what they are, unless other commands have that option, too; and their unit.
 _GIVEN = {
-    "restitution": ("speed up over speed down of a flat landing", "1"),
-    "damping": ("of the ground, per node [kg/s], beside --stiffness", "kg/s"),
-    "stiffness": ("of the ground, per node [kg/s²]", "kg/s²"),
-    "contact_time": ("for how long the ground pushes [s]", "s"),
+    "restitution": ("", "1"),
+    "damping": (", beside --stiffness", "kg/s"),
+    "stiffness": ("", "kg/s²"),
+    "contact_time": ("", "s"),
     "depth": ("the deepest penetration [m]", "m"),
 }
 _CUBE = {
-    "mass": ("of the cube [kg]", "kg"),
-    "side": ("of the cube [m]", "m"),
+    "mass": ("", "kg"),
+    "side": ("", "m"),
     "speed": ("at which it lands [m/s]", "m/s"),
     "drop": ("the height from which it falls, in place of a speed [m]", "m"),
 }
@@ -47,40 +48,44 @@ GRAVITY = 9.8
 def add(ground: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     for name, (told, _) in (_GIVEN | _CUBE).items():
-        ground.add_argument(f"--{name.replace('_', '-')}", metavar="X", help=told)
-    ground.add_argument("--gravity", metavar="X", default=str(GRAVITY), help=f"[m/s²] (default: {GRAVITY:g})")
-    ground.add_argument("--law", default="gated", metavar="LAW", help="gated or ungated (default: gated)")
+        option = f"--{name.replace('_', '-')}"
+        if option in grammar.OPTIONS:
+            grammar.add(ground, option, told)
+        else:
+            ground.add_argument(option, metavar="X", help=told)
+    grammar.add(ground, "--gravity", f" (default: {GRAVITY:g})", default=str(GRAVITY))
+    grammar.add(ground, "--contact", " (default: gated)", default="gated")
     told = "a measured restitution by its name; without a name, the table of them with sources"
-    ground.add_argument("--material", nargs="?", const="", metavar="NAME", help=told)
-    ground.add_argument("--engine", metavar="NAME", help="mujoco, pybullet or drake: what to paste into it")
-    told = "with --engine: what to paste is for this one [s] (default: the longest that keeps e within 5 %%)"
-    ground.add_argument("--timestep", metavar="H", help=told)
+    ground.add_argument("--material", nargs="?", const="", metavar="MATERIAL", help=told)
+    ground.add_argument("--engine", metavar="ENGINE", help="mujoco, pybullet or drake: what to paste into it")
+    grammar.add(
+        ground, "--dt", ", with --engine: what to paste is for it (default: the longest that keeps e within 5 %%)"
+    )
     ground.add_argument("--quick", action="store_true", help="leave out the longest steps of our schemes")
-    ground.add_argument("--json", action="store_true", help="the same for programs")
+    grammar.add_form(ground)
 
 
 def call(options: argparse.Namespace) -> None:
     """Print the ground."""
-    import json
-
     from stiffdice.advice.materials import MATERIALS
 
     if options.material == "":
         if options.json:
-            print(
-                json.dumps({name: found._asdict() for name, found in MATERIALS.items()}, indent=2, ensure_ascii=False)
-            )
+            output.say_json({name: found._asdict() for name, found in MATERIALS.items()})
             return
         from stiffdice.report import ground_page
 
-        print("\n".join(ground_page.material_lines()))
+        output.say(ground_page.material_lines())
         return
     contact = _contact(options)
-    timestep = None if options.timestep is None else common.number("--timestep", options.timestep, "s", above=0)
+    timestep = None if options.dt is None else common.number("--dt", options.dt, "s", above=0)
     if timestep is not None and options.engine is None:
-        raise InputError("--timestep: allowed is beside --engine only")
+        raise InputError("--dt: allowed is beside --engine only")
     lines, data = _told(options, contact, timestep)
-    print(json.dumps(data, indent=2, ensure_ascii=False) if options.json else "\n".join(lines))
+    if options.json:
+        output.say_json(data)
+    else:
+        output.say(lines)
 
 
 def _contact(options: argparse.Namespace) -> Contact:
@@ -99,13 +104,13 @@ def _contact(options: argparse.Namespace) -> Contact:
             raise InputError(f"--{name}: is needed")
     if ("speed" in cube) == ("drop" in cube):
         raise InputError("--speed and --drop: needed is one of them")
-    if "drop" in cube and options.law == "ungated":
-        raise InputError("--drop: allowed with --law gated, as ungated ground brakes a cube in the air; give --speed")
+    if "drop" in cube and options.contact == "ungated":
+        raise InputError("--drop: allowed with --contact gated, as ungated ground brakes a cube in the air; or --speed")
     if "drop" in cube and not gravity > 0:
         raise InputError(f"--gravity = {gravity:g}: allowed beside --drop is a number > 0 [m/s²]")
     speed = cube["speed"] if "speed" in cube else math.sqrt(2 * gravity * cube["drop"])
     return contact_design.designed(
-        given, mass=cube["mass"], side=cube["side"], speed=speed, gravity=gravity, law=options.law
+        given, mass=cube["mass"], side=cube["side"], speed=speed, gravity=gravity, law=options.contact
     )
 
 
@@ -139,7 +144,7 @@ def _told(options: argparse.Namespace, contact: Contact, timestep: float | None)
                 tell(scheme)
                 limits[scheme] = step_limits.limits(contact, scheme)
             lines += ["", *ground_page.limit_lines(limits, contact)]
-            data["longest_steps"] = ground_page.limits_as_data(limits)
+            data["longest_steps_s"] = ground_page.limits_as_data(limits)
         if engine:
             tell(engine)
             ladder = engine_ladder.climbed(engine, contact, timestep)

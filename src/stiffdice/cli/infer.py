@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stiffdice.cli import grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import InputError
 
 HELP = "say what shape and centre of mass a die has, from how often its faces came up"
@@ -31,8 +33,8 @@ def add(infer: argparse.ArgumentParser) -> None:
     told = f"of the experiment face-response; may be given more than once (default: {RESPONSE})"
     infer.add_argument("--response", metavar="FILE.h5", action="append", default=[], help=told)
     told = "of a die of which is known how it was thrown: dropped, tossed or rolled (default: all are possible)"
-    infer.add_argument("--throw", metavar="NAME", help=told)
-    infer.add_argument("--json", action="store_true", help="the same for programs")
+    infer.add_argument("--throw", metavar="THROW", help=told)
+    grammar.add_form(infer)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -53,5 +55,5 @@ def call(options: argparse.Namespace) -> int:
         tables = [table for table in tables if table.throw == options.throw]
     found = infer.posterior(given, tables)
     page = inference_page.as_json if options.json else inference_page.as_text
-    print(page(given, found, tables, origin))
+    output.say(page(given, found, tables, origin))
     return 0

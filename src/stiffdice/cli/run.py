@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import InputError, printable, told_within
 
 if TYPE_CHECKING:
@@ -34,23 +34,23 @@ _DPI = 120  # of an animation
 
 def add(run: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    run.add_argument("scene", metavar="SCENE.yaml", help="the physical problem; config/README.md lists its keys")
-    run.add_argument("-o", "--output", metavar="OUT.h5", required=True, help="the file to write")
+    grammar.add_scene(run)
+    grammar.add(run, "--output", ", an .h5 file", required=True)
     told = (
         "vertical, sliding, tumbling, flying, or auto: the least that is exact for the scene (default: tumbling); "
         "pair: two cubes, of a scene with `cubes` (default there)"
     )
-    run.add_argument("--model", metavar="M", help=told)
+    run.add_argument("--model", metavar="MODEL", help=told)
     told = "stiffdice, or mujoco, pybullet, drake, dart, scipy, octave, numpy where installed (default: stiffdice)"
-    run.add_argument("--simulator", default="stiffdice", metavar="NAME", help=told)
-    told = "symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
-    run.add_argument("--scheme", metavar="NAME", help=told)
+    run.add_argument("--simulator", default="stiffdice", metavar="SIMULATOR", help=told)
+    told = ": symplectic_euler, forward_euler, velocity_verlet, rk4, implicit_euler, event, exact (default: the first)"
+    grammar.add(run, "--scheme", told)
     steps = run.add_mutually_exclusive_group()
-    steps.add_argument("--steps", default="10000", metavar="N", help="number of time steps (default: 10000)")
-    steps.add_argument("--dt", metavar="H", help="in place of --steps: the longest step, as 1e-4 or '0.1 ms' [s]")
+    grammar.add(steps, "--steps", " (default: 10000)", default="10000")
+    grammar.add(steps, "--dt", ", in place of --steps: the longest")
     told = "of the error, for a scheme that controls its own (default: 1e-9 of the motion)"
     run.add_argument("--tolerance", metavar="X", help=told)
-    run.add_argument("--every", metavar="K", help="keep every K-th step (default: at most 10,000 are kept)")
+    run.add_argument("--every", metavar="N", help="keep every N-th step (default: at most 10,000 are kept)")
     told = (
         "most force evaluations of event, exact and scipy (default: 1e7), most steps of all others (default: all); "
         "a run that needs more is stored as undecided"
@@ -58,9 +58,10 @@ def add(run: argparse.ArgumentParser) -> None:
     run.add_argument("--budget", metavar="N", help=told)
     told = "book where the energy goes, bounce by bounce, of two cubes body by body (takes longer)"
     run.add_argument("--ledger", action="store_true", help=told)
-    run.add_argument("--animate", metavar="FILE.gif", help="draw the run as it goes, of what turns")
-    run.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
-    common.add_changes(run)
+    grammar.add(run, "--animate", ": what turns")
+    grammar.add_changes(run)
+    grammar.add(run, "--force")
+    grammar.add_form(run)
 
 
 def call(options: argparse.Namespace) -> None:
@@ -68,8 +69,6 @@ def call(options: argparse.Namespace) -> None:
     from stiffdice.io import yaml_loader
     from stiffdice.scene import pair
 
-    if options.animate is not None and not options.animate.endswith(".gif"):
-        raise InputError(f"--animate = {options.animate}: allowed is a name that ends with .gif")
     data = yaml_loader.load(options.scene)  # once: it may be a pipe
     run = _run_pair if pair.is_pair(data) else _run_one
     run(options, data)
@@ -94,6 +93,7 @@ def _run_one(options: argparse.Namespace, data: Any) -> None:
     from stiffdice.report import run_page
     from stiffdice.simulation import backend, energy_budget
     from stiffdice.simulation.dataset import plain_run_dataset
+    from stiffdice.simulation.outcome import Verdict
     from stiffdice.simulation.run import simulate
 
     model = options.model or "tumbling"
@@ -106,7 +106,7 @@ def _run_one(options: argparse.Namespace, data: Any) -> None:
     every = _every_of(options, steps)
     tolerance = schemes.TOLERANCE if options.tolerance is None else common.number("--tolerance", options.tolerance, "1")
     budget = None if options.budget is None else common.whole("--budget", options.budget)
-    _warn(run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps))
+    output.note(run_page.doubts(scene, setup.model, setup.scheme if setup.ours else "", steps))
     with progress(setup.scheme if setup.ours else "") as show:
         run = simulate(
             scene,
@@ -127,11 +127,13 @@ def _run_one(options: argparse.Namespace, data: Any) -> None:
     write_dataset(dataset, target)
     if drawing is not None:
         _animate(dataset, drawing, "A thrown cube")
-    _say([*scene.derived, note])
-    if model == AUTO:
-        print(run.model_reason)
+    reason = [run.model_reason] if model == AUTO else []
+    if options.json:
+        output.say_json(run_page.as_data(run, str(target), [*scene.derived, *filter(None, [note]), *reason]))
+        return
     advise = shlex.join(["stiffdice", "advise", *common.scene_words(options, options.overrides), "--error", "1%"])
-    _say(run_page.lines(run, str(target), advise))
+    _say([*scene.derived, note, *reason])
+    output.say_verdict(run_page.lines(run, str(target), advise), str(target), Verdict(run.verdict[0]))
 
 
 # Options that mean nothing for two cubes, with what does.
@@ -163,6 +165,7 @@ def _run_pair(options: argparse.Namespace, data: Any) -> None:
     from stiffdice.io.writer import write_dataset
     from stiffdice.report import pair_page
     from stiffdice.simulation import backend
+    from stiffdice.simulation.outcome import Verdict
     from stiffdice.simulation.pair import energy_budget
     from stiffdice.simulation.pair.dataset import plain_pair_dataset
     from stiffdice.simulation.pair.run import check_scheme, simulate_pair
@@ -173,7 +176,7 @@ def _run_pair(options: argparse.Namespace, data: Any) -> None:
         validation.choice("--ledger: scheme", scheme, [energy_budget.BOOKED])
     every = _every_of(options, steps)
     with progress("two cubes") as show:
-        _warn(pair_page.doubts(scene, scheme, steps))
+        output.note(pair_page.doubts(scene, scheme, steps))
         run = simulate_pair(scene, scheme=scheme, steps=steps, every=every, progress=show)
         dataset = plain_pair_dataset(run)
         if options.ledger:
@@ -182,7 +185,12 @@ def _run_pair(options: argparse.Namespace, data: Any) -> None:
     write_dataset(dataset, target)
     if drawing is not None:
         _animate(dataset, drawing, "Two cubes")
-    _say([*scene.derived, note, *pair_page.lines(run, str(target))])
+    notes = [*scene.derived, *filter(None, [note])]
+    if options.json:
+        output.say_json(pair_page.as_data(run, str(target), notes))
+        return
+    _say(notes)
+    output.say_verdict(pair_page.lines(run, str(target)), str(target), Verdict(run.verdict[0]))
 
 
 def _steps_of(options: argparse.Namespace, duration: float) -> tuple[int, str]:
@@ -205,10 +213,11 @@ def _every_of(options: argparse.Namespace, steps: int) -> int:
 def _targets_of(options: argparse.Namespace) -> tuple[Path, Path | None]:
     """Return the files to write: the run, and its animation, if one is asked for."""
     from stiffdice.io import seal
-    from stiffdice.io.writer import check_target
 
     target = common.target_of(options.output, options.force, seal.is_sealed, options.scene)
-    return target, None if options.animate is None else check_target(options.animate)
+    if options.animate is None:
+        return target, None
+    return target, common.picture_target("--animate", options.animate, [".gif"], options.force, options.scene)
 
 
 def _animate(dataset: PlainDataset, target: Path, title: str) -> None:
@@ -218,11 +227,6 @@ def _animate(dataset: PlainDataset, target: Path, title: str) -> None:
     from stiffdice.report.figures import registry, runs
 
     registry.store(runs.animation, {"run": xr.Dataset(*dataset)}, title, _DPI, [str(target)])
-
-
-def _warn(lines: list[str]) -> None:
-    for line in lines:
-        print(f"stiffdice: note: {printable(line)}", file=sys.stderr)
 
 
 def _say(lines: list[str]) -> None:

@@ -10,7 +10,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 
 if TYPE_CHECKING:
     from stiffdice.study.status import Status
@@ -36,8 +37,8 @@ def add(status: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     status.add_argument("study", metavar="STUDY", nargs="?", help="a file in config/, without .yaml")
     status.add_argument("--watch", action="store_true", help="look every two seconds, until the run has ended")
-    status.add_argument("--cores", metavar="N", help="for the time left (default: as many as are at work)")
-    status.add_argument("--json", action="store_true", help="the same for programs")
+    grammar.add(status, "--cores", ", for the time left (default: as many as are at work)")
+    grammar.add_form(status)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -81,12 +82,13 @@ def _tell(found: list[Status], options: argparse.Namespace) -> None:
     if options.json:
         data = [as_data(status) for status in found]
         indent = None if options.watch else 2  # a line for each look
-        print(json.dumps(data if options.study is None else data[0], indent=indent), flush=True)
+        print(json.dumps({"studies": data} if options.study is None else data[0], indent=indent), flush=True)
     elif options.study is not None:
-        print(as_text(found[0]), flush=True)
+        output.say(as_text(found[0]))
     else:
         lines = [as_line(status) for status in found]
-        print("\n".join(lines or ["no study has results yet; `make study STUDY=quick` makes some"]), flush=True)
+        output.say(lines or ["no study has results yet; `make study STUDY=quick` makes some"])
+    sys.stdout.flush()
 
 
 def _exit_status(found: list[Status]) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,20 +33,21 @@ faces sum to seven. Every throw of a seed is the same again. Exit status: 0 when
 
 def add(command: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    command.add_argument("scene", nargs="?", metavar="SCENE.yaml", help="the die and the ground (default: a 16 mm die)")
+    grammar.add_scene(command, " (default: a 16 mm die)")
     command.add_argument("--count", default="1", metavar="N", help="number of throws (default: 1)")
-    command.add_argument("--seed", default="0", metavar="S", help="of the random launches (default: 0)")
+    grammar.add(command, "--seed", ": of the launches (default: 0)", default="0")
     told = "uniform: over all rotations; as_launched: the scene's (default: uniform)"
-    command.add_argument("--orientation", default="uniform", metavar="O", help=told)
-    told = "standard deviation of each component of the velocity (default: 0.3 m/s)"
-    command.add_argument("--velocity-spread", default="0.3", metavar="V", help=told)
-    told = "of the angular velocity (default: 30 rad/s); `scene` draws the angular momentum as the scene says"
-    command.add_argument("--spin-spread", default="30", metavar="W", help=told)
-    command.add_argument("--scheme", default="symplectic_euler", metavar="NAME", help="default: symplectic_euler")
-    command.add_argument("--steps", metavar="N", help="to the scene's duration (default: such that ω h is 0.3)")
-    command.add_argument("--animate", metavar="FILE.gif", help="draw one throw as it goes")
-    command.add_argument("--json", action="store_true", help="print the result as JSON")
-    common.add_changes(command)
+    command.add_argument("--orientation", default="uniform", metavar="ORIENTATION", help=told)
+    told = "standard deviation of each component of the velocity [m/s] (default: 0.3)"
+    command.add_argument("--velocity-spread", default="0.3", metavar="X", help=told)
+    told = "of the angular velocity [rad/s] (default: 30); `scene` draws the angular momentum as the scene says"
+    command.add_argument("--spin-spread", default="30", metavar="X", help=told)
+    grammar.add(command, "--scheme", " (default: symplectic_euler)", default="symplectic_euler")
+    grammar.add(command, "--steps", " to the scene's duration (default: such that ω h is 0.3)")
+    grammar.add(command, "--animate", ": one throw")
+    grammar.add_changes(command)
+    grammar.add(command, "--force")
+    grammar.add_form(command)
 
 
 def call(options: argparse.Namespace) -> None:
@@ -67,36 +68,42 @@ def call(options: argparse.Namespace) -> None:
         spin_spread=spread,
         seed=common.whole("--seed", options.seed, at_least=0),
     )
-    if options.animate is not None and (count != 1 or not options.animate.endswith(".gif")):
-        raise InputError(f"--animate = {options.animate}: allowed is a name that ends with .gif, of one throw")
+    target = None
+    if options.animate is not None:
+        if count != 1:
+            raise InputError(f"--animate = {options.animate}: allowed is with one throw, without --count")
+        sources = [] if options.scene is None else [options.scene]
+        target = common.picture_target("--animate", options.animate, [".gif"], options.force, *sources)
 
+    from stiffdice.cli.terminal.progress import notes, progress
     from stiffdice.experiments.dice import throws
 
     steps = throws.default_steps(scene) if options.steps is None else common.whole("--steps", options.steps)
     if count == 1:
-        thrown = throws.one(scene, launches, options.scheme, steps)
+        with notes("throw: throwing"):
+            thrown = throws.one(scene, launches, options.scheme, steps)
         _show(options, throws.told_of_one(thrown), thrown.as_mapping())
-        if options.animate is not None:
-            _animate(thrown, Path(options.animate))
+        if target is not None:
+            with notes("throw: drawing"):
+                _animate(thrown, target)
         return
-    from stiffdice.cli.terminal.progress import progress
-
     with progress("") as show:
         many = throws.many(scene, launches, options.scheme, steps, count, progress=show)
     _show(options, throws.told_of_many(many), many.as_mapping())
 
 
 def _show(options: argparse.Namespace, lines: list[str], mapping: dict[str, Any]) -> None:
-    print(json.dumps(mapping, indent=2) if options.json else "\n".join(lines))
+    if options.json:
+        output.say_json(mapping)
+    else:
+        output.say(lines)
 
 
 def _animate(thrown: Thrown, target: Path) -> None:
     """Draw a throw as it goes, until it is decided and a little longer."""
-    from stiffdice.io.writer import check_target
     from stiffdice.report.figures import registry, runs
     from stiffdice.simulation.dataset import run_dataset
 
-    check_target(target)
     shown = run_dataset(thrown.run)
     if thrown.time is not None:
         shown = shown.sel(time=slice(0, thrown.time + _AFTER))

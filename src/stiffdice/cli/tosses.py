@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import InputError, printable
 from stiffdice.scene import validation
 
 HELP = "replay measured tosses of a real cube: restitution and friction, and how right the simulation is"
 EXAMPLES = """\
 examples:
-  stiffdice tosses --data config/measurements/tosses.h5
-  stiffdice tosses --data config/measurements/tosses.h5 --animate toss.gif --toss 12
-  stiffdice tosses --data config/measurements/tosses.h5 --contact-time '2 ms' --json
+  stiffdice tosses config/measurements/tosses.h5
+  stiffdice tosses config/measurements/tosses.h5 --animate toss.gif --toss 12
+  stiffdice tosses config/measurements/tosses.h5 --contact-time '2 ms' --json
 
 Restitution and friction are fitted on a random third of the tosses, and told on the others; it takes about ten
 seconds. config/measurements/README.md says what a file of tosses holds. Exit status: 0, or 2 for bad input.
@@ -25,16 +25,14 @@ GRAVITY = "9.80"
 
 def add(tosses: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    tosses.add_argument("--data", metavar="FILE.h5", required=True, help="measured tosses, netCDF-4")
-    told = "of a flat landing on the board (default: 5 ms)"
-    tosses.add_argument("--contact-time", metavar="T", default="5 ms", help=told)
-    told = f"where the tosses were made [m/s²] (default: {GRAVITY})"
-    tosses.add_argument("--gravity", metavar="G", default=GRAVITY, help=told)
-    tosses.add_argument("--seed", metavar="N", default="18", help="of the third that is fitted (default: 18)")
-    tosses.add_argument("--json", action="store_true", help="the same for programs")
-    tosses.add_argument("--animate", metavar="OUT.gif", help="draw one toss beside its simulation, too")
-    tosses.add_argument("--toss", metavar="K", help="with --animate: the number of the toss, from 1 on (default: 1)")
-    tosses.add_argument("--force", action="store_true", help="replace a file that is not a GIF, too")
+    tosses.add_argument("data", metavar="FILE.h5", help="measured tosses, netCDF-4")
+    grammar.add(tosses, "--contact-time", " (default: 5 ms)", default="5 ms")
+    grammar.add(tosses, "--gravity", f", where the tosses were made (default: {GRAVITY})", default=GRAVITY)
+    grammar.add(tosses, "--seed", ": of the third that is fitted (default: 18)", default="18")
+    grammar.add(tosses, "--animate", ": one toss beside its simulation")
+    tosses.add_argument("--toss", metavar="N", help="with --animate: the number of the toss, from 1 on (default: 1)")
+    grammar.add(tosses, "--force")
+    grammar.add_form(tosses)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -44,9 +42,7 @@ def call(options: argparse.Namespace) -> int:
     seed = common.whole("--seed", options.seed)
     target = None
     if options.animate is not None:
-        if not options.animate.endswith(".gif"):
-            raise InputError(f"--animate = {options.animate}: allowed is the name of a GIF, as toss.gif")
-        target = common.target_of(options.animate, options.force, _is_gif, options.data)
+        target = common.picture_target("--animate", options.animate, [".gif"], options.force, options.data)
     elif options.toss is not None:
         raise InputError("--toss: says which toss to draw, with --animate only")
 
@@ -69,16 +65,13 @@ def call(options: argparse.Namespace) -> int:
             found = summary_of(stored, scene, contact_time, seed, tell)
     except InputError as error:
         raise error.within(options.data) from None
-    print(toss_page.as_json(options.data, found) if options.json else toss_page.as_text(printable(options.data), found))
+    output.say(
+        toss_page.as_json(options.data, found) if options.json else toss_page.as_text(printable(options.data), found)
+    )
     if target is not None:
         from stiffdice.report.figures import registry
 
         data = {"toss": single.dataset(found.tosses, scene, found.physics, number - 1)}
-        registry.draw("toss-animation", data, f"Toss {number} beside its simulation", 80, [str(target)])
+        with notes("tosses: drawing"):
+            registry.draw("toss-animation", data, f"Toss {number} beside its simulation", 80, [str(target)])
     return 0
-
-
-def _is_gif(path: Path) -> bool:
-    """Return whether a file begins as a GIF does."""
-    with path.open("rb") as file:
-        return file.read(6) in {b"GIF87a", b"GIF89a"}

@@ -123,10 +123,10 @@ def ladder_as_data(ladder: Ladder, contact: Contact) -> dict[str, Any]:
     columns = []
     for column in ladder.columns:
         found = [
-            {"timestep": rung.timestep, "omega_h": rung.omega_h, "restitution": list(rung.found[column])}
+            {"timestep_s": rung.timestep, "omega_h": rung.omega_h, "restitution": list(rung.found[column])}
             for rung in ladder.rungs
             if column in rung.found
         ]
         longest = {name: ladder.longest(column, name, contact.restitution) for name in KEPT}
-        columns.append({**column._asdict(), "bounces": found, "longest_timestep": longest})
+        columns.append({**column._asdict(), "bounces": found, "longest_timestep_s": longest})
     return {"name": ladder.engine, "version": ladder.version, "installed": ladder.installed, "columns": columns}

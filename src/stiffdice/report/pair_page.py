@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from stiffdice.dynamics import linear_theory
@@ -9,6 +11,7 @@ from stiffdice.dynamics.box_contact.pair_state import pair_physics_of, pair_star
 from stiffdice.dynamics.state import Array
 from stiffdice.integrators import linear_stability
 from stiffdice.report import run_page
+from stiffdice.report.number_format import finite
 from stiffdice.scene.pair import PairScene
 from stiffdice.simulation.outcome import Verdict
 from stiffdice.simulation.pair import energy, linear_limit
@@ -46,6 +49,23 @@ def lines(run: PairRun, name: str) -> list[str]:
     if run.trajectory is not None:
         said += _motion(run.trajectory)
     return [*said, f"  steps     {_steps(run)}"]
+
+
+def as_data(run: PairRun, name: str, notes: list[str]) -> dict[str, Any]:
+    """Return the same as plain data, units in the keys. notes: what was derived, a line each."""
+    ratio = {"measure": "energy_ratio", "value": finite(float(run.energy_ratio[0])), "limit": 1 + TOLERANCE}
+    return {
+        **run_page.verdict_as_data(name, Verdict(run.verdict[0])),
+        "model": "pair",
+        "scheme": run.scheme,
+        "steps": run.steps,
+        "steps_done": int(run.steps_done[0]),
+        "step_size_s": run.scene.duration / run.steps,
+        "criteria": {"energy": ratio},
+        "meetings": int(run.meetings[0]),
+        "deepest_contact_m": finite(float(run.deepest[0])),
+        "notes": notes,
+    }
 
 
 def _motion(trajectory: PairTrajectory) -> list[str]:

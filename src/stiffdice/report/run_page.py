@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from stiffdice.dynamics import linear_theory
 from stiffdice.dynamics.state import TOUCHING, TURNING, start_of
 from stiffdice.integrators import linear_stability
 from stiffdice.integrators import registry as schemes
+from stiffdice.report.number_format import finite
 from stiffdice.scene.rotation import along
 from stiffdice.scene.scene import Scene
 from stiffdice.simulation.backend import OURS
@@ -83,6 +85,37 @@ def lines(run: Run, name: str, advise: str) -> list[str]:
     if run.simulator == OURS:
         said.append(f"  accuracy  was not looked at; this does: {advise}")
     return said
+
+
+def as_data(run: Run, name: str, notes: list[str]) -> dict[str, Any]:
+    """Return the same as plain data, units in the keys. notes: what was derived, and why this model, a line each."""
+    criteria = {}
+    for criterion, tolerance in run.tolerances.items():
+        part = CRITERIA[criterion]
+        measure = float(run.measures[part.MEASURE][0])
+        criteria[criterion] = {"measure": part.MEASURE, "value": finite(measure), "limit": part.BASE + tolerance}
+    return {
+        **verdict_as_data(name, Verdict(run.verdict[0])),
+        "model": run.model,
+        "simulator": run.simulator_version,
+        "scheme": run.scheme,
+        "steps": run.steps,
+        "steps_done": int(run.steps_done[0]),
+        "step_size_s": run.scene.duration / run.steps,
+        "omega_h": finite(float(linear_theory.omega_h(run.scene, run.steps))),
+        "criteria": criteria,
+        "notes": notes,
+    }
+
+
+def verdict_as_data(name: str, verdict: Verdict) -> dict[str, Any]:
+    """Return what the data on any run begin with; name: of its file."""
+    return {
+        "file": name,
+        "passed": verdict == Verdict.PASSED,
+        "verdict": verdict.name.lower(),
+        "sentence": verdict.sentence,
+    }
 
 
 def _steps(run: Run) -> str:

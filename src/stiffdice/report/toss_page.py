@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,15 @@ if TYPE_CHECKING:
     from stiffdice.experiments.tosses.summary import Summary
 
 _SOURCES = {"sample": "from its first sample", "flight": "from the fit to its flight"}
+# Ends of the keys for programs, of what has a dimension.
+_UNITS = {
+    "fall": "_m_per_s2",
+    "fall_error": "_m_per_s2",
+    "position": "_m",
+    "orientation": "_rad",
+    "velocity": "_m_per_s",
+    "angular_velocity": "_rad_per_s",
+}
 _NORMAL = 1.96  # half of a 95 % interval, in standard errors
 
 
@@ -62,12 +71,19 @@ def _half(values: np.ndarray[Any, Any]) -> float:
     return _NORMAL * float(values.std()) / math.sqrt(len(values))
 
 
+def _with_units(values: NamedTuple) -> dict[str, float | None]:
+    return {f"{name}{_UNITS.get(name, '')}": finite(value) for name, value in values._asdict().items()}
+
+
 def as_json(path: str, found: Summary) -> str:
-    """Return the same for programs: SI units; path in sides, orientation in rad, shares from 0 to 1."""
+    """Return the same for programs: units in the keys, path in sides, shares from 0 to 1."""
     fit = found.fit
     told = {
         source: {
-            name: {"mean": finite(float(values.mean())), "half_interval": finite(_half(values))}
+            f"{name}{'_sides' if name == 'path' else _UNITS.get(name, '')}": {
+                "mean": finite(float(values.mean())),
+                "half_interval": finite(_half(values)),
+            }
             for name, values in each._asdict().items()
         }
         for source, each in found.told.items()
@@ -76,10 +92,12 @@ def as_json(path: str, found: Summary) -> str:
         "file": path,
         "tosses": len(found.tosses.counts),
         "fitted": found.fitted,
-        "side": found.tosses.side,
-        "unit": {name: finite(value) for name, value in found.unit._asdict().items()},
-        "tracker": found.tracker._asdict(),
-        "contact_time": found.physics.contact_time,
+        "side_m": found.tosses.side,
+        "unit": _with_units(
+            found.unit, {"length": "", "length_error": "", "fall": "_m_per_s2", "fall_error": "_m_per_s2"}
+        ),
+        "tracker": _with_units(found.tracker),
+        "contact_time_s": found.physics.contact_time,
         "restitution": {"best": fit.restitution, "interval": fit.restitution_interval},
         "friction": {"best": fit.friction, "interval": fit.friction_interval},
         "kept_face": found.kept,

@@ -7,7 +7,8 @@ import contextlib
 from pathlib import Path
 
 from stiffdice import __version__
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 
 HELP = "pack a finished study with all that made it into one file"
 EXAMPLES = """\
@@ -25,19 +26,17 @@ each. To be called in the project's folder.
 def add(archive: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
     archive.add_argument("study", metavar="STUDY", help="the name of a file in config/, without .yaml")
-    told = "default: results/archives/STUDY-VERSION.crate.zip"
-    archive.add_argument("-o", dest="output", metavar="FILE.zip", help=told)
-    archive.add_argument("--force", action="store_true", help="replace a file that is not of stiffdice, too")
+    grammar.add(archive, "--output", ", a .zip file (default: results/archives/STUDY-VERSION.crate.zip)")
     archive.add_argument("--agent", metavar="NAME", help="who ran the study, if the archive is to say so")
-    archive.add_argument("--json", action="store_true", help="sizes for programs")
+    grammar.add(archive, "--force")
+    grammar.add_form(archive)
 
 
 def call(options: argparse.Namespace) -> None:
     """Pack the study, and print how much room it takes."""
-    import json
-
     from stiffdice.archive import pack
     from stiffdice.archive.contents import in_megabytes
+    from stiffdice.cli.terminal.progress import notes
     from stiffdice.errors import printable
 
     study = common.study_of(options.study)
@@ -47,11 +46,12 @@ def call(options: argparse.Namespace) -> None:
         target = common.target_of(options.output, options.force, _is_archive)
     else:
         target.parent.mkdir(parents=True, exist_ok=True)
-    packed = pack.pack(study, Path(), target, options.agent)
+    with notes(f"archive: packing {study.name}") as tell:
+        packed = pack.pack(study, Path(), target, options.agent, tell.part)
     if options.json:
-        print(json.dumps({"archive": str(packed.path), "bytes": packed.size, **packed.sizes.as_data()}, indent=2))
+        output.say_json({"archive": str(packed.path), "bytes": packed.size, **packed.sizes.as_data()})
         return
-    print("\n".join([*study.left_out, str(packed.sizes), printable(f"{packed.path}: {in_megabytes(packed.size)}")]))
+    output.say([*study.left_out, str(packed.sizes), printable(f"{packed.path}: {in_megabytes(packed.size)}")])
 
 
 def _is_archive(path: Path) -> bool:

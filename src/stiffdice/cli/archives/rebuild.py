@@ -11,7 +11,8 @@ from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 from stiffdice import __version__
-from stiffdice.cli import common
+from stiffdice.cli import common, grammar
+from stiffdice.cli.terminal import output
 
 if TYPE_CHECKING:
     from stiffdice.archive.rebuild import Opened
@@ -34,12 +35,13 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)  # the end of a login sends both
 
 def add(rebuild: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    rebuild.add_argument("archive", metavar="ARCHIVE")
-    rebuild.add_argument("-o", "--output", metavar="FOLDER", help="run it in this new folder, and leave it there")
-    rebuild.add_argument("--cores", default="1", metavar="N", help="jobs at once (default: 1)")
+    rebuild.add_argument("archive", metavar="ARCHIVE", help="an archive (.zip)")
+    grammar.add(rebuild, "--output", ": a new folder, in which it runs and stays (default: none stays)")
+    grammar.add(rebuild, "--cores", ", that many jobs at once (default: 1)", default="1")
     rebuild.add_argument("--yes", action="store_true", help="run the archive's own code without asking")
     told = "without a sandbox: its code can read and change all that you can"
     rebuild.add_argument("--no-sandbox", action="store_true", help=told)
+    grammar.add_form(rebuild)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -51,14 +53,14 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.cli.terminal.progress import notes
 
     with _told_to_stop(), ExitStack() as stack:
-        with notes("stiffdice: unpacking and checking the archive"):
+        with notes("rebuild: unpacking and checking the archive"):
             unpacked = stack.enter_context(opened(options.archive, options.output))
             way = way_of(unpacked, not options.no_sandbox)
         if not unpacked.code.is_installed and not options.yes:
             _ask(unpacked, way)
-        with notes(f"stiffdice: rebuilding {unpacked.study}"):
-            rebuilt = rebuild(unpacked, way, cores)
-    print("\n".join(rebuilt.lines()))
+        with notes(f"rebuild: making {unpacked.study} again") as tell:
+            rebuilt = rebuild(unpacked, way, cores, tell.part)
+    output.say(rebuilt.as_json() if options.json else rebuilt.lines())
     return 0 if rebuilt.ok else 1
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 
 from stiffdice import __version__
+from stiffdice.cli import grammar
+from stiffdice.cli.terminal import output
 from stiffdice.errors import printable
 
 HELP = "check an archive or a folder of results: digests, seals, schema, physics"
@@ -23,8 +25,8 @@ at all. docs/how-to/verify.md says what is checked, and how to check it without 
 
 def add(verify: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    verify.add_argument("path", metavar="ARCHIVE|FOLDER", help="an archive, an unpacked one, results, or an .h5 file")
-    verify.add_argument("--json", action="store_true", help="the same for programs")
+    verify.add_argument("path", metavar="PATH", help="an archive (.zip), an unpacked one, results, or an .h5 file")
+    grammar.add_form(verify)
 
 
 def call(options: argparse.Namespace) -> int:
@@ -32,7 +34,7 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.archive.verify import verify
     from stiffdice.cli.terminal.progress import notes
 
-    with notes(f"stiffdice: checking {printable(options.path)}"):
-        report = verify(options.path)
-    print(report.as_json() if options.json else "\n".join(report.lines()))
+    with notes(f"verify: checking {printable(options.path)}") as tell:
+        report = verify(options.path, tell.part)
+    output.say(report.as_json() if options.json else report.lines())
     return 0 if report.ok else 1

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import shutil
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from functools import cache
+from typing import Self
+
+from stiffdice.cli.terminal.output import QUIET
 
 QUIET_SECONDS = 2.0
 # s of one core of docs/explanation/speed.md; any other scheme takes about as long as the next.
@@ -15,21 +20,45 @@ _COMPILING = {"event": 12.0, "two cubes": 8.0}
 
 
 class _Line:
-    """A line that rewrites itself on a terminal; a line for each text elsewhere."""
+    """A line that rewrites itself on a terminal; a line for each text elsewhere; nothing where all is to be quiet."""
 
     def __init__(self) -> None:
-        self.is_terminal, self.is_shown = sys.stderr.isatty(), False
+        self.is_terminal = sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        self.is_quiet, self.is_shown = QUIET.get() or sys.stderr is None, False
+        self.interval = 0.2 if self.is_terminal else 10.0  # s between two texts
 
     def say(self, text: str) -> None:
+        if self.is_quiet:
+            return
         self.is_shown = True
-        print(f"\r\x1b[K{text}" if self.is_terminal else f"{text}\n", end="", file=sys.stderr, flush=True)
+        if self.is_terminal:  # what is longer than the terminal is wide could not be taken back
+            text = f"\r\x1b[K{text[: shutil.get_terminal_size().columns - 1]}"
+        with contextlib.suppress(OSError):  # nobody reads it any more; the work goes on
+            print(text, end="" if self.is_terminal else "\n", file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         if self.is_shown and self.is_terminal:
             self.say("")
 
 
-@contextmanager
+class _Left:
+    """The time left of what has been done in part, from when its first part was done: compilation and all."""
+
+    def __init__(self) -> None:
+        self._first: tuple[float, float] | None = None
+
+    def after(self, fraction: float) -> str:
+        """Return how much is done and about how long the rest takes; empty as long as that is not known."""
+        now = time.monotonic()
+        self._first = self._first or (now, fraction)
+        since, before = self._first
+        if not before < fraction < 1:
+            return ""
+        left = (now - since) * (1 - fraction) / (fraction - before)
+        return f"{fraction:6.1%} done, about {left:.0f} s left"
+
+
+@contextlib.contextmanager
 def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
     """Give a function that shows the fraction done: every ten seconds, on a terminal five times a second.
 
@@ -37,18 +66,14 @@ def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
     """
     from stiffdice.dynamics.kernel_cache import telling
 
-    line, next_time = _Line(), time.monotonic() + QUIET_SECONDS
-    first: tuple[float, float] | None = None  # when the first part was done, compilation and all
+    line, left, next_time = _Line(), _Left(), time.monotonic() + QUIET_SECONDS
 
     def show(fraction: float) -> None:
-        nonlocal first, next_time
-        now = time.monotonic()
-        first = first or (now, fraction)
-        since, before = first
-        if now >= next_time and before < fraction < 1:
-            next_time = now + (0.2 if line.is_terminal else 10.0)
-            left = (now - since) * (1 - fraction) / (fraction - before)
-            line.say(f"{fraction:6.1%} done, about {left:.0f} s left")
+        nonlocal next_time
+        text = left.after(fraction)
+        if text and time.monotonic() >= next_time:
+            next_time = time.monotonic() + line.interval
+            line.say(text)
 
     @cache
     def compiles() -> None:
@@ -62,22 +87,37 @@ def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
         line.clear()
 
 
-@contextmanager
-def notes(what: str) -> Iterator[Callable[[str], None]]:
-    """Say what the block does, once two seconds are over; give a function that takes what it does next."""
-    line, text = _Line(), what
+class Notes:
+    """What a block is at; called with what it does next, `part` with the fraction of it that is done."""
 
-    def show(doing: str) -> None:
-        nonlocal text
-        text = f"{what} {doing}"
-        if line.is_shown:
-            line.say(text)
+    def __init__(self, what: str) -> None:
+        self._what = self._text = what
+        self._line, self._left, self._next_time = _Line(), _Left(), 0.0
+        self._timer = threading.Timer(QUIET_SECONDS, lambda: self._line.say(f"{self._text} ..."))
+        self._timer.daemon = True
 
-    timer = threading.Timer(QUIET_SECONDS, lambda: line.say(f"{text} ..."))
-    timer.daemon = True
-    timer.start()
-    try:
-        yield show
-    finally:
-        timer.cancel()
-        line.clear()
+    def __call__(self, doing: str) -> None:
+        """Say what is done next."""
+        self._text = f"{self._what} {doing}"
+        if self._line.is_shown:
+            self._line.say(self._text)
+
+    def part(self, fraction: float) -> None:
+        """Say how much is done, and about how long the rest takes."""
+        left = self._left.after(fraction)
+        if left and self._line.is_shown and time.monotonic() >= self._next_time:
+            self._next_time = time.monotonic() + self._line.interval
+            self._line.say(f"{self._text}: {left.strip()}")
+
+    def __enter__(self) -> Self:
+        self._timer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._timer.cancel()
+        self._line.clear()
+
+
+def notes(what: str) -> Notes:
+    """Return what says what a block does, once two seconds are over."""
+    return Notes(what)

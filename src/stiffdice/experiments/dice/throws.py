@@ -44,7 +44,7 @@ class Thrown:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {"face": self.face, "rest": self.rest.name.lower(), "time": self.time, "steps": self.run.steps}
+        return {"face": self.face, "rest": self.rest.name.lower(), "time_s": self.time, "steps": self.run.steps}
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,7 @@ class Throws:
         low, high = counting.intervals(self.counts)
         value, tail = counting.chi_square(self.counts)
         shares = self.counts / self.counts.sum()
+        median, slow = np.quantile(self.times, (0.5, 0.99))
         return {
             "throws": sum(self.rests.values()),
             "scheme": self.scheme,
@@ -76,7 +77,10 @@ class Throws:
                 for face, count, share, a, b in zip(die.FACES, self.counts, shares, low, high, strict=True)
             },
             "rest": {rest.name.lower(): count for rest, count in self.rests.items()},
-            "time_to_rest": {"median": float(np.median(self.times)), "99%": float(np.quantile(self.times, 0.99))},
+            "time_to_rest_s": {
+                "median": float(np.median(self.times)),
+                "quantile_99": float(np.quantile(self.times, 0.99)),
+            },
             "chi_square": value,
             "p_of_a_fair_die": tail,
         }

@@ -21,7 +21,11 @@ from stiffdice.study.catalogue import DRAWINGS
 # Of an animation; 50 ms a frame, because a GIF counts in hundredths of a second.
 FRAMES_PER_SECOND = 20
 COLOURS = 64  # of all frames together
-_METADATA = {"svg": {"Date": None, "Creator": "stiffdice"}, "png": {"Software": "stiffdice"}}
+_METADATA = {
+    "svg": {"Date": None, "Creator": "stiffdice"},
+    "png": {"Software": "stiffdice"},
+    "pdf": {"CreationDate": None, "Creator": "stiffdice"},
+}
 
 
 class Animation(NamedTuple):

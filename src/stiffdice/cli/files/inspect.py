@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from stiffdice.cli import grammar
+from stiffdice.cli.terminal import output
+
 HELP = "say what a file holds: its verdict, its scene, its variables"
 EXAMPLES = """\
 examples:
@@ -17,8 +20,8 @@ examples:
 
 def add(inspect: argparse.ArgumentParser) -> None:
     """Add its options to the command."""
-    inspect.add_argument("file", metavar="FILE.h5")
-    inspect.add_argument("--json", action="store_true", help="the same for programs")
+    inspect.add_argument("file", metavar="FILE.h5", help="a file of stiffdice")
+    grammar.add_form(inspect)
 
 
 def call(options: argparse.Namespace) -> None:
@@ -34,4 +37,4 @@ def call(options: argparse.Namespace) -> None:
 
         admitted.result()
     dataset = plain_file(options.file)
-    print(file_page.as_json(dataset) if options.json else file_page.as_text(dataset, options.file))
+    output.say(file_page.as_json(dataset) if options.json else file_page.as_text(dataset, options.file))

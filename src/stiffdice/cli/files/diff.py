@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from stiffdice.cli import grammar
+from stiffdice.cli.terminal import output
+
 HELP = "say whether two results differ, where, and by how much"
 EXAMPLES = """\
 examples:
@@ -25,13 +28,15 @@ def add(diff: argparse.ArgumentParser) -> None:
     diff.add_argument("a", metavar="A", type=Path, help="a file (.h5), a folder of results, or an archive (.zip)")
     diff.add_argument("b", metavar="B", type=Path, help="another of the same kind")
     diff.add_argument("--all", action="store_true", help="compare side files, too: logs, times, reports")
-    diff.add_argument("--json", action="store_true", help="the same for programs, and all of it")
+    grammar.add_form(diff)
 
 
 def call(options: argparse.Namespace) -> int:
     """Print what differs; 1 if anything does."""
     from stiffdice.archive.compare import compare
+    from stiffdice.cli.terminal.progress import notes
 
-    found = compare(options.a, options.b, all_files=options.all)
-    print(found.as_json() if options.json else "\n".join(found.lines()))
+    with notes("diff: comparing") as tell:
+        found = compare(options.a, options.b, all_files=options.all, progress=tell.part)
+    output.say(found.as_json() if options.json else found.lines())
     return 0 if found.same else 1
