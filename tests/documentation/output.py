@@ -43,10 +43,13 @@ def normalised(text: str) -> str:
 def difference(shown: str, printed: str) -> str:
     """Return how what was printed differs from what is shown; empty where it does not.
 
-    A shown line of three dots stands for any lines.
+    A shown line of three dots stands for any lines, three dots within one for anything there.
     """
     expected, found = normalised(shown), normalised(printed)
-    parts = ["(?:.*\n)*" if line in ANYTHING else re.escape(line) + "\n" for line in expected.splitlines()]
+    parts = [
+        "(?:.*\n)*" if line in ANYTHING else re.escape(line).replace(re.escape("..."), ".*") + "\n"
+        for line in expected.splitlines()
+    ]
     if re.fullmatch("".join(parts), found):
         return ""
     return "\n".join(difflib.unified_diff(expected.splitlines(), found.splitlines(), "shown", "printed", lineterm=""))
