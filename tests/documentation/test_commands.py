@@ -59,7 +59,9 @@ def test_commands_name_options_and_targets_that_there_are(page):
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_within_prose_name_options_and_targets_that_there_are(page):
     """They may be cut short: `stiffdice run --ledger`."""
-    text = re.sub(r"^( *)```.*?^\1```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(
+        r"<!--.*?-->|^( *)```.*?^\1```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
+    )
     known = cli._parser()._subparsers._group_actions[0].choices
     for code in re.findall(r"`((?:\.venv/bin/)?(?:stiffdice|make) [a-z-][^`]*)`", text):
         program, *words = shlex.split(code.removeprefix(".venv/bin/"))
