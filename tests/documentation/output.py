@@ -37,7 +37,7 @@ def normalised(text: str) -> str:
         text = re.sub(pattern, instead, text)
     # `advise` sorts schemes by their time.
     row = r"^ +(?:> )?(?:event|exact|\w+_(?:euler|verlet)|rk4) .*\bTIME\b.*\n"
-    return re.sub(rf"(?m)(?:{row})+", _by_name, text.strip() + "\n")
+    return re.sub(rf"(?m)(?:{row})+", _by_name, text.strip("\n") + "\n")
 
 
 def difference(shown: str, printed: str) -> str:
