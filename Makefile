@@ -11,7 +11,7 @@ CORES ?= $(shell nproc 2>/dev/null || echo 2)
 STUDY ?= paper
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes study status report archive bench sweep-million test test-fast test-all test-slurm mutants lint types check docs lock clean
+.PHONY: help install install-engines paper stability extremes tradeoff refinement landing engines pair pair-engines tosses shapes study status report report-finished report-study archive bench sweep-million test test-fast test-all test-slurm figures-baseline mutants lint types check docs lock clean
 
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,10 +62,17 @@ status:  ## how far a study is, what failed and why: make status STUDY=NAME
 	@PYTHON="$(PYTHON)" requirements/install --check
 	@$(BIN)/stiffdice status '$(STUDY)' || [ $$? -ne 2 ]
 
-report: study  ## results/NAME/report.html: every figure with its caption, code and configuration: make report STUDY=NAME
-	@$(BIN)/snakemake --cores $(CORES) study --config 'study=$(STUDY)' --report 'results/$(STUDY)/report.html'
+LOOK := --report-stylesheet workflow/report/report.css
+# Of the study that is named, which is run first; else of those that are finished.
+report: $(if $(filter file,$(origin STUDY)),report-finished,report-study)  ## results/report.html: all finished studies; or run one, into results/NAME/report.html: make report STUDY=NAME
 
-archive: report  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
+report-finished: install
+	@$(BIN)/snakemake --cores $(CORES) finished --report results/report.html $(LOOK)
+
+report-study: study
+	@$(BIN)/snakemake --cores $(CORES) study --config 'study=$(STUDY)' --report 'results/$(STUDY)/report.html' $(LOOK)
+
+archive: report-study  ## run config/NAME.yaml and pack it with all that made it, into results/archives/: make archive STUDY=NAME
 	@$(BIN)/stiffdice archive '$(STUDY)'
 
 bench: install  ## measure how fast it is, into results/bench/, and compare with the last time
@@ -88,6 +95,10 @@ test-all: install  ## run all tests, with many draws, faults and kills of a prom
 
 test-slurm: install  ## run a sweep on a Slurm of two nodes that lives for it alone, and kill parts of it (root, Debian's packages)
 	@tests/slurm/run $(BIN)/python
+
+# Where matplotlib is the locked one; look at them before.
+figures-baseline: install  ## write the pictures anew that figures are compared with, after a change that is meant
+	@$(BIN)/python -m pytest -n 0 tests/report/figures/test_looks.py --mpl-generate-path=tests/report/baseline
 
 MODULES ?= dynamics/linear_theory integrators/linear_stability sweep/partition sweep/stability_limits
 mutants: install  ## break modules in a dozen places each, and tell what their tests do not notice: make mutants MODULES=sweep/grid

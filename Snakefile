@@ -11,6 +11,7 @@
 #   snakemake shapes                      which face of a box comes up, by shape and load
 #   snakemake pair                        two cubes that meet: steps they need, how they leave each other
 #   snakemake study --config study=NAME   everything that config/NAME.yaml asks for
+#   snakemake finished --report FILE      no job: a report of all studies that are finished
 #
 # A study is a file in config/; its results lie in results/ under the same name.
 
@@ -90,6 +91,11 @@ rule shapes:
 rule pair:
     input:
         lambda wildcards: everything_of("pair"),
+
+
+rule finished:
+    input:
+        lambda wildcards: everything_finished(),
 
 
 rule study:

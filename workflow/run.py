@@ -16,7 +16,7 @@ from pathlib import Path
 
 STAGES = (
     *("trajectory", "experiment", "timings", "shard", "survey", "collect", "frontier"),
-    *("table", "figure", "animation"),
+    *("table", "figure", "animation", "pdf"),
 )
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -136,5 +136,5 @@ def test_damping_is_less_by_what_implicit_steps_add_as_long_as_there_is_any():
 
 
 def test_engines_have_no_ungated_ground():
-    with pytest.raises(InputError, match="--law = ungated: allowed with --engine is gated"):
+    with pytest.raises(InputError, match="--contact = ungated: allowed with --engine is gated"):
         engine_parameters.parameters("mujoco", contact(0.5, "ungated"), 1e-5)

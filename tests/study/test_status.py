@@ -407,7 +407,10 @@ def test_programs_get_the_same_numbers(project):
     assert data["bytes"]["total"] == sum(
         path.stat().st_size for path in Path("results/quick").rglob("*") if path.is_file()
     )
-    assert [json.loads(project("--json")[1])[0][key] for key in ("state", "cells")] == [data["state"], data["cells"]]
+    assert [json.loads(project("--json")[1])["studies"][0][key] for key in ("state", "cells")] == [
+        data["state"],
+        data["cells"],
+    ]
 
 
 def test_watching_ends_when_all_is_done(project):

@@ -15,6 +15,7 @@ from snakemake.iocontainers import Params
 from snakemake.logging import format_dict
 from snakemake.report.html_reporter.data import render_results
 
+from stiffdice.study.catalogue import DRAWINGS
 from stiffdice.study.config import PlannedFigure
 
 sys.path.append(str(Path(__file__).parents[2] / "workflow" / "scripts"))
@@ -52,11 +53,13 @@ class Page(HTMLParser):
 def test_a_title_is_text_in_its_caption_and_in_the_settings(kind, title):
     planned = PlannedFigure("energy", ("steps",), title)
     params = Params(fromdict={"planned": Sealed(planned)})
-    snakemake = SimpleNamespace(params=params, wildcards=SimpleNamespace(study="tiny"))
+    files = ["results/tiny/runs/steps.as_listed.h5"]
+    snakemake = SimpleNamespace(params=params, wildcards=SimpleNamespace(study="tiny"), input=files)
     caption = jinja2.Template((CAPTIONS / f"{kind}.rst").read_text()).render(snakemake=snakemake)
     body = publish_parts(caption, writer="html")["body"]
     found = Page(body)
-    assert all(tag in ("p", "em") and not attrs for tag, attrs in found.tags)
+    allowed = {("p", ()), ("em", ()), ("tt", (("class", "docutils literal"),)), ("span", (("class", "pre"),))}
+    assert {(tag, tuple(attrs)) for tag, attrs in found.tags} <= allowed
     assert "".join(found.text).startswith(f"{' '.join(title.split())} (tiny).")
 
     job = SimpleNamespace(rule=SimpleNamespace(name=kind))
@@ -68,3 +71,17 @@ def test_a_title_is_text_in_its_caption_and_in_the_settings(kind, title):
     page = Page(f'<script id="results">var results = {element};</script><p>after</p>')
     assert [tag for tag, _ in page.tags] == ["script", "p"]
     assert json.loads(element)["x.svg"]["job_properties"]["params"] == format_dict(params)
+
+
+@pytest.mark.parametrize("draw", DRAWINGS)
+def test_each_drawing_has_its_own_words_what_to_see_who_asked_and_where_the_data_are(draw):
+    planned = PlannedFigure(draw, ("x",), "A title")
+    files = ["results/mine/experiments/x.h5", "results/mine/experiments/y.h5"]
+    snakemake = SimpleNamespace(
+        params=Params(fromdict={"planned": Sealed(planned)}), wildcards=SimpleNamespace(study="mine"), input=files
+    )
+    caption = jinja2.Template((CAPTIONS / "figure.rst").read_text()).render(snakemake=snakemake)
+    found = "".join(Page(publish_parts(caption, writer="html")["body"]).text)
+    assert ("wireframe" in found) == draw.startswith(("cube", "animation"))
+    assert "Asked in config/mine.yaml; data:" in found
+    assert all(file in found for file in files)

@@ -6,12 +6,14 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 from html import unescape
 from types import SimpleNamespace
 
 import pytest
 import yaml
+from playwright.sync_api import sync_playwright
 from tests.archive import packing
 from tests.workflow.test_workflow import TINY, Project
 
@@ -25,6 +27,9 @@ pytestmark = [
 RUNS = "document.title='broken'"
 TITLE = f'</script><script>{RUNS}</script><img src=x onerror={RUNS}>\nit\'s "so" \u202eb <b>bold</b> &amp; ω'
 SHOWN = TITLE.replace("\n", " ").replace("\u202e", r"\u202e")
+
+LOOK = "--report-stylesheet", "workflow/report/report.css"
+LOADED = "() => [...document.images].some(image => image.complete && image.naturalWidth > 100)"
 
 # Follows links by their place in the page, and notes what is shown then.
 VISITOR = """
@@ -105,3 +110,55 @@ def test_nothing_of_a_title_runs_in_the_page_of_an_archive(tmp_path, monkeypatch
     assert seen.title == f"stiffdice study tiny: {shown}"
     assert seen.elements == 0
     assert seen.text.count(shown) == 3  # the question, the title of the figure and who ran it
+
+
+@pytest.fixture(scope="module")
+def chapters(tmp_path_factory):
+    """A report of two studies that are finished, of one without a chapter, and of none that has only begun."""
+    project = Project(tmp_path_factory.mktemp("chapters"))
+    run = {**TINY["runs"]["stiff"], "presets": ["as_listed"], "steps": 1000}
+    few = {"runs": {"stiff": run}, "figures": {"position": {"draw": "position", "run": "stiff", "title": "Where"}}}
+    for name in ("paper", "stability", "tiny", "pair"):
+        (project.folder / f"config/{name}.yaml").write_text(yaml.safe_dump({"question": "Why?", **few}))
+    files = [f"results/{name}/figures/position.svg" for name in ("stability", "paper", "tiny")]
+    (project.folder / "results/pair").mkdir()
+    for arguments in ((*files, "--cores", "2"), ("finished", "--report", "results/report.html", *LOOK)):
+        command = [sys.executable, "-m", "snakemake", *arguments]
+        done = subprocess.run(
+            command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert "left out: pair is not finished: make status STUDY=pair" in done.stderr
+    return project.folder / "results/report.html"
+
+
+@pytest.mark.long
+def test_the_report_tells_its_chapters_in_order_with_captions_and_figures_and_asks_no_network(chapters):
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page()
+        errors, requests = [], []
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(chapters.as_uri())
+        page.wait_for_selector("nav ul a")
+        named = [text.strip() for text in page.locator("nav ul a").all_inner_texts()]
+        assert [text for text in named if text[:1].isdigit()] == ["1 Paper", "2 Stability", "7 Other studies"]
+        page.get_by_text("2 Stability").click()
+        see, about = page.locator("table tbody a").all()[:2]
+        about.click()
+        page.wait_for_selector("text=Asked in")
+        shown = page.inner_text("body")
+        for words in (
+            "Where (stability).",
+            "Asked in config/stability.yaml",
+            "results/stability/runs/stiff.as_listed.h5",
+        ):
+            assert words in shown
+        see.click()
+        page.wait_for_function(LOADED)  # beside Snakemake's logo, which is smaller
+        page.screenshot(path=chapters.with_name("report.png"))
+        browser.close()
+    assert not errors
+    assert {url.partition(":")[0] for url in requests} <= {"file", "data", "blob"}

@@ -1,6 +1,7 @@
 # What the rules share: studies, read and checked once, and the paths that follow from them.
 
 import math
+import os
 import sys
 import time
 from functools import cache
@@ -252,6 +253,32 @@ def everything_of(name):
     """Return all results of a study; what needs an engine that is not installed is left out, with a line."""
     tell_left_out(name)
     return [f"results/{name}/{file}" for result, _ in needs_of(name).values() for file in result.files]
+
+
+def everything_finished():
+    """Return all results of the studies of which none is missing or stale; those that have begun are named."""
+    begun = [path.stem for path in sorted(Path("config").glob("*.yaml")) if Path("results", path.stem).is_dir()]
+    whole = [name for name in begun if all(map(os.path.exists, everything_of(name))) and not stale_files(name)]
+    for name in sorted({*begun} - {*whole}):
+        print(f"stiffdice: left out: {name} is not finished: make status STUDY={name}", file=sys.stderr)
+    if not whole:
+        print("stiffdice: no study is finished; make paper makes the first", file=sys.stderr)
+        sys.exit(2)
+    return [file for name in whole for file in everything_of(name)]
+
+
+# The order in which a reader meets the studies; the report sorts by name.
+CHAPTERS = {
+    **{"paper": "1 Paper", "tradeoff": "3 Trade", "pair": "5 Pair"},
+    **dict.fromkeys(("stability", "extremes", "refinement", "million"), "2 Stability"),
+    **dict.fromkeys(("landing", "shapes", "tosses"), "4 Dice"),
+    **dict.fromkeys(("engines", "pair-engines", "granular"), "6 Engines"),
+}
+
+
+def chapter(wildcards):
+    """Return the chapter of the report that a study belongs to."""
+    return CHAPTERS.get(wildcards.study, "7 Other studies")
 
 
 # A mistake in the study asked for is told before anything else is said.

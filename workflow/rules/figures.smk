@@ -9,8 +9,8 @@ rule figure:
         report(
             "results/{study}/figures/{figure}.svg",
             caption="../report/figure.rst",
-            category="{study}",
-            labels={"what": "{figure}"},
+            category=chapter,
+            labels={"study": "{study}", "what": "{figure}"},
         ),
         "results/{study}/figures/{figure}.png",
     params:
@@ -35,8 +35,8 @@ use rule figure as animation with:
         report(
             "results/{study}/figures/{figure}.gif",
             caption="../report/figure.rst",
-            category="{study}",
-            labels={"what": "{figure}"},
+            category=chapter,
+            labels={"study": "{study}", "what": "{figure}"},
         ),
     params:
         planned=sealed("figure"),
@@ -48,6 +48,20 @@ use rule figure as animation with:
         "results/{study}/benchmarks/animation/{figure}.tsv"
 
 
+# On demand, as it would make a study with many figures slower.
+use rule figure as pdf with:
+    output:
+        "results/{study}/figures/{figure}.pdf",
+    params:
+        planned=sealed("figure"),
+        dpi=lambda wildcards: study(wildcards.study).dpi,
+        asked=asked_of("pdf", "{figure}"),
+    log:
+        "results/{study}/logs/pdf/{figure}.log",
+    benchmark:
+        "results/{study}/benchmarks/pdf/{figure}.tsv"
+
+
 rule table:
     input:
         not_stale,
@@ -56,8 +70,8 @@ rule table:
         markdown=report(
             "results/{study}/tables/{table}.md",
             caption="../report/table.rst",
-            category="{study}",
-            labels={"what": "{table}"},
+            category=chapter,
+            labels={"study": "{study}", "what": "{table}"},
         ),
         csv="results/{study}/tables/{table}.csv",
     params:

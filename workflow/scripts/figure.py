@@ -1,5 +1,7 @@
 """Draw one figure."""
 
+from pathlib import Path
+
 from job import Job, Say, begin
 
 
@@ -8,9 +10,12 @@ def make(job: Job, say: Say) -> None:
     from inputs import opened
 
     from stiffdice.report.figures import registry as figures
+    from stiffdice.study.job_log import digest_of
 
     planned, data = job.plan(), opened(job.input.items(), say)
-    figures.draw(planned.draw, data, planned.title, job.dpi, job.output)
+    made_from = {"study": job.wildcards["study"], "figure": job.wildcards["figure"], "asked": job.asked}
+    made_from |= {f"file {name}": digest_of(Path(path)) for name, path in job.input.items()}
+    figures.draw(planned.draw, data, planned.title, job.dpi, job.output, made_from)
     say(f"{planned.draw} drawn")
 
 

@@ -21,7 +21,7 @@ DATA, SHOWN, REPORT, LOGS = "data", "figures and tables", "report", "logs and be
 CONFIG, CODE, LOCK, TEXT = "studies and scenes", "code and workflow", "locked versions", "text for people"
 KINDS = (DATA, SHOWN, REPORT, LOGS, CONFIG, CODE, LOCK, TEXT)
 # Of results by their stage; all others are data.
-_KINDS = {"figure": SHOWN, "animation": SHOWN, "table": SHOWN, "timings": LOGS}
+_KINDS = {"figure": SHOWN, "animation": SHOWN, "pdf": SHOWN, "table": SHOWN, "timings": LOGS}
 
 # Of the project, files and whole folders.
 _PROJECT = dict.fromkeys(("CHANGELOG.md", "CITATION.cff", "LICENSE", "README.md", "results/README.md"), TEXT)

@@ -161,7 +161,9 @@ def span_of(files: Iterable[File]) -> tuple[datetime, datetime] | None:
 
 def describe(result: Result, study: Study) -> str:
     """Return in one line what a result is: the title of a figure or table, the stage and name of any other."""
-    shown = {"figure": study.figures, "animation": study.figures, "table": study.tables}.get(result.stage, {})
+    shown = {"figure": study.figures, "animation": study.figures, "pdf": study.figures, "table": study.tables}.get(
+        result.stage, {}
+    )
     return shown[result.name].title if result.name in shown else f"{result.stage} {result.name}"
 
 
@@ -190,7 +192,7 @@ def page(facts: Facts) -> str:
     # Worth opening; shards, logs and code are in the manifest.
     paths = ["README.md", "LICENSE", "CITATION.cff", f"config/{facts.study.name}.yaml", manifest.NAME]
     for file in facts.files:
-        is_data = file.result is not None and file.result.stage not in {"shard", "figure", "animation"}
+        is_data = file.result is not None and file.result.stage not in {"shard", "figure", "animation", "pdf"}
         if is_data or file.kind == REPORT or file.path == "docs/reference/FORMAT.md":
             paths.append(file.path)
     return template.render(facts=facts, paths=paths, manifest=manifest.NAME)

@@ -140,8 +140,9 @@ def _told(options: argparse.Namespace, contact: Contact, timestep: float | None)
     with notes("ground: measuring") as tell:
         if not options.quick:
             limits = {}
-            for scheme in step_limits.FIXED:
+            for number, scheme in enumerate(step_limits.FIXED):
                 tell(scheme)
+                tell.part(number / len(step_limits.FIXED))
                 limits[scheme] = step_limits.limits(contact, scheme)
             lines += ["", *ground_page.limit_lines(limits, contact)]
             data["longest_steps_s"] = ground_page.limits_as_data(limits)

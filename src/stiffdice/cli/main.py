@@ -48,6 +48,7 @@ COMMANDS = {
         *(inspect, plot, diff, status, archive, verify, rebuild, completion),
     )
 }
+_INTERRUPTED = "interrupted; nothing was stored"
 # What is meant by a file in place of a command, by its ending.
 _MEANT = {".yaml": "run", ".yml": "run", ".h5": "inspect", ".zip": "verify", ".xml": "check"}
 
@@ -129,8 +130,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # as in `stiffdice --help | head -1`
         return _unread()
     except OSError as error:  # no room where standard output goes
-        _unread()
-        return _failed(f"standard output: {error.strerror}")
+        return _unread() or _failed(_about(error))
+    except KeyboardInterrupt:
+        return _failed(_INTERRUPTED, 130)
     return status
 
 
@@ -142,15 +144,20 @@ def called(options: argparse.Namespace) -> int:
     except StiffdiceError as error:
         return _failed(str(error))
     except KeyboardInterrupt:
-        return _failed("interrupted; nothing was stored", 130)
+        return _failed(_INTERRUPTED, 130)
     except BrokenPipeError:  # as in `stiffdice inspect FILE | head`
         return _unread()
     except MemoryError:
         return _failed("not enough memory; keep fewer samples with a larger --every")
     except OSError as error:  # no room for the compiled kernel, say
-        return _failed(printable(error))
+        return (_unread() if error.filename is None else 0) or _failed(_about(error))
     finally:
         output.QUIET.reset(quiet)
+
+
+def _about(error: OSError) -> str:
+    """Return what the system said; an error without a file's name is one of standard output."""
+    return printable(f"{error.filename or 'standard output'}: {error.strerror or error}")
 
 
 def _failed(told: str, status: int = 2) -> int:

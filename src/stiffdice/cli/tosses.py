@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from stiffdice.cli import common, grammar
 from stiffdice.cli.terminal import output
@@ -51,6 +52,8 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.scene import tosses as files
     from stiffdice.scene.scene import Ground, Scene
 
+    if Path(options.data).is_dir():
+        raise InputError(f"{options.data}: Is a directory")
     stored = files.admitted(options.data)
     number = 1 if options.toss is None else common.whole("--toss", options.toss)
     validation.count("--toss", number, at_most=len(stored.counts))

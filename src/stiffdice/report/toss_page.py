@@ -71,6 +71,14 @@ def _half(values: np.ndarray[Any, Any]) -> float:
     return _NORMAL * float(values.std()) / math.sqrt(len(values))
 
 
+def _key(error: str) -> str:
+    return f"{error}{'_sides' if error == 'path' else _UNITS.get(error, '')}"
+
+
+def _interval(values: np.ndarray[Any, Any]) -> dict[str, float | None]:
+    return {"mean": finite(float(values.mean())), "half_interval": finite(_half(values))}
+
+
 def _with_units(values: NamedTuple) -> dict[str, float | None]:
     return {f"{name}{_UNITS.get(name, '')}": finite(value) for name, value in values._asdict().items()}
 
@@ -79,13 +87,7 @@ def as_json(path: str, found: Summary) -> str:
     """Return the same for programs: units in the keys, path in sides, shares from 0 to 1."""
     fit = found.fit
     told = {
-        source: {
-            f"{name}{'_sides' if name == 'path' else _UNITS.get(name, '')}": {
-                "mean": finite(float(values.mean())),
-                "half_interval": finite(_half(values)),
-            }
-            for name, values in each._asdict().items()
-        }
+        source: {_key(name): _interval(values) for name, values in each._asdict().items()}
         for source, each in found.told.items()
     }
     data = {
@@ -93,9 +95,7 @@ def as_json(path: str, found: Summary) -> str:
         "tosses": len(found.tosses.counts),
         "fitted": found.fitted,
         "side_m": found.tosses.side,
-        "unit": _with_units(
-            found.unit, {"length": "", "length_error": "", "fall": "_m_per_s2", "fall_error": "_m_per_s2"}
-        ),
+        "unit": _with_units(found.unit),
         "tracker": _with_units(found.tracker),
         "contact_time_s": found.physics.contact_time,
         "restitution": {"best": fit.restitution, "interval": fit.restitution_interval},

@@ -88,6 +88,8 @@ class PlannedFigure(NamedTuple):
 class Study:
     """Everything one YAML file in config/ asks for, and what of it is left out: a line for each, and why.
 
+    formats: of figures; PDF is made if it is among them, the others always.
+
     Left out is what needs an engine that is not installed: runs, sweeps, methods of experiments and timings, and what
     is drawn or told of these alone.
     """
@@ -101,6 +103,7 @@ class Study:
     figures: Mapping[str, PlannedFigure]
     tables: Mapping[str, PlannedFigure]
     dpi: int
+    formats: tuple[str, ...] = ("png", "svg")
     left_out: tuple[str, ...] = ()
 
 
@@ -136,7 +139,8 @@ def load(path: str | Path, schema: str | Path) -> Study:
             **parts,
             figures=_shown(data, "figures", catalogue.DRAWINGS, parts, left_out),
             tables=_shown(data, "tables", catalogue.TABLES, parts, left_out),
-            dpi=int(data.get("dpi", 150)),
+            dpi=int(data.get("dpi", 200)),
+            formats=tuple(data.get("formats", ("png", "svg"))),
             left_out=tuple(left_out),
         )
     except InputError as error:

@@ -29,7 +29,7 @@ from stiffdice.sweep import partition as shards
 # Of a job that the warm process takes, besides what it simulates: files, drawing. One of its own also imports, for 1 s.
 _JOB = {
     **{"trajectory": 0.3, "experiment": 0.3, "timings": 0.3, "shard": 0.3, "survey": 0.3, "collect": 0.4},
-    **{"frontier": 0.2, "figure": 0.5, "animation": 1.1, "table": 0.2},
+    **{"frontier": 0.2, "figure": 0.5, "animation": 1.1, "pdf": 0.4, "table": 0.2},
 }
 _DRAWING = 1.0  # more than that, of a figure that shows more than a run
 _STARTING = 0.12  # of Snakemake, to choose and start a job

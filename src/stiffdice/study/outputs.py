@@ -44,6 +44,7 @@ _CODE = {
     "frontier": ("frontier.py", "stiffdice.sweep.stability_limits", _READS, _WRITES),
     "figure": _DRAW,
     "animation": _DRAW,
+    "pdf": _DRAW,
     "table": ("table.py", _READS, _WRITES),
 }
 
@@ -51,8 +52,8 @@ _CODE = {
 class Result(NamedTuple):
     """What one job makes: files under results/STUDY/, in a stage of the workflow, under a name of its own there.
 
-    stage: `trajectory`, `experiment`, `timings`, `shard`, `survey`, `collect`, `frontier`, `figure`, `animation` or
-    `table`.
+    stage: `trajectory`, `experiment`, `timings`, `shard`, `survey`, `collect`, `frontier`, `figure`, `animation`, `pdf`
+    or `table`.
     """
 
     stage: str
@@ -106,7 +107,10 @@ def _made(study: Study) -> Iterator[tuple[Result, Sequence[Key]]]:
     for name, figure in study.figures.items():
         stage, kinds = ("animation", ["gif"]) if figure.draw.endswith("animation") else ("figure", ["svg", "png"])
         files = tuple(f"figures/{name}.{kind}" for kind in kinds)
-        yield Result(stage, name, files), _shown_by(study, figure, DRAWINGS[figure.draw].given)
+        shown = _shown_by(study, figure, DRAWINGS[figure.draw].given)
+        yield Result(stage, name, files), shown
+        if stage == "figure" and "pdf" in study.formats:
+            yield Result("pdf", name, (f"figures/{name}.pdf",)), shown
     for name, table in study.tables.items():
         files = f"tables/{name}.md", f"tables/{name}.csv"
         yield Result("table", name, files), _shown_by(study, table, TABLES[table.draw].given)
@@ -212,7 +216,7 @@ def _parts(study: Study, result: Result, root: Path) -> tuple[Any, ...]:
             if "data" in part.options:
                 plan.append(_content(root / part.options["data"]))
             return scenes.load(root / part.scene, part.changes).digest, plan, entries[part.measure].module
-        case "figure" | "animation":
+        case "figure" | "animation" | "pdf":
             return "-", [study.figures[name], [study.dpi]], DRAWINGS[study.figures[name].draw].module
         case "table":
             return "-", [study.tables[name], []], TABLES[study.tables[name].draw].module

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from stiffdice.cli.terminal import progress
+from stiffdice.cli.terminal import output, progress
 from stiffdice.dynamics import kernel_cache
 
 
@@ -48,3 +48,35 @@ def test_compiling_is_said_once(capsys):
         tell(), tell()
     assert capsys.readouterr().err == "compiling the kernels of event, once; about 12 s\n"
     assert kernel_cache.TELLING.get() is None
+
+
+def test_what_is_done_in_parts_says_how_long_it_will_take(clock, monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)
+    with progress.notes("verify: checking x") as tell:
+        time.sleep(0.2)  # until the note has begun
+        for clock[0], fraction in ((1.0, 0.0), (2.0, 0.25), (2.1, 0.3), (13.0, 0.5)):
+            tell.part(fraction)
+    told = capsys.readouterr().err
+    assert "verify: checking x: 25.0% done, about 3 s left\n" in told
+    assert "verify: checking x: 50.0% done, about 12 s left\n" in told
+    assert "30.0%" not in told, "a line every ten seconds"
+
+
+@pytest.mark.parametrize("said", [progress.notes, progress.progress])
+def test_quiet_leaves_progress_out(clock, monkeypatch, capsys, said):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)
+    before = output.QUIET.set(True)
+    with said("x") as tell:
+        time.sleep(0.1)
+        for clock[0], fraction in ((1.0, 0.1), (20.0, 0.5)):
+            (tell.part if said is progress.notes else tell)(fraction)
+    output.QUIET.reset(before)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_line_that_moves_fits_the_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "30")
+    monkeypatch.setenv("TERM", "xterm")
+    progress._Line().say("stiffdice: checking " + "a" * 100)
+    assert capsys.readouterr().err == "\r\x1b[Kstiffdice: checking aaaaaaaaa"

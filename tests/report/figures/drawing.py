@@ -16,8 +16,8 @@ def drawn(name, data):
 
 def check_equal_files(name, data, folder):
     for copy in "ab":
-        registry.draw(name, data, "A title", 80, [str(folder / f"{copy}.{kind}") for kind in ("svg", "png")])
-    for kind in ("svg", "png"):
+        registry.draw(name, data, "A title", 80, [str(folder / f"{copy}.{kind}") for kind in registry.FORMATS])
+    for kind in registry.FORMATS:
         assert (folder / f"a.{kind}").read_bytes() == (folder / f"b.{kind}").read_bytes()
 
 

@@ -157,7 +157,8 @@ def throw():
 
 
 def texts(figure):
-    return " ".join(part.get_text().replace("\n", " ") for part in figure.texts)
+    told = [*figure.texts, *(legend.get_title() for legend in figure.legends)]
+    return " ".join(part.get_text().replace("\n", " ") for part in told)
 
 
 @pytest.mark.long

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import struct
 from xml.etree import ElementTree
 
@@ -8,6 +9,7 @@ import pytest
 from PIL import Image
 from tests.report.figures.drawing import check_equal_files, check_units, drawn, lines_of
 
+from stiffdice import __version__
 from stiffdice.report.figures import registry as figures
 from stiffdice.report.figures import runs, style
 from stiffdice.scene.cube import SIGNS
@@ -188,6 +190,46 @@ def test_an_energy_that_rises_is_seen(data):
         full = run.energy_paper + run.elastic_energy
         assert low <= float(run.energy_paper.min())
         assert high >= float(full.max())
+
+
+@pytest.mark.parametrize("kind", figures.FORMATS)
+def test_a_file_says_what_it_is_made_from(data, kind, tmp_path):
+    """In each format, where its readers look for it; and as bytes, where anything finds it."""
+    run, path = data["cube"]["as_listed"], tmp_path / f"a.{kind}"
+    made_from = {"study": "mine", "file as_listed": "0123abcd"}
+    figures.draw("cube-end", {"as_listed": run}, "Heights, in µm", 50, [str(path)], made_from)
+    told = figures.provenance({"as_listed": run}, {"drawing": "cube-end", **made_from})
+    assert told.startswith(
+        f"stiffdice {__version__}; drawing cube-end; study mine; file as_listed 0123abcd; as_listed: "
+    )
+    assert f"scene {run.attrs['scene_digest'][:16]}" in told
+    assert f"code {run.attrs['code_digest'][:16]}" in told
+    content = path.read_bytes()
+    assert re.search(rb"stiffdice [0-9.]+; [ -(*-;=-~]*;", content)[0] == told.encode()
+    if kind == "png":
+        with Image.open(path) as image:
+            assert image.text == {
+                "Title": "Heights, in µm",
+                "Description": told,
+                "Software": f"stiffdice {__version__}",
+            }
+    elif kind == "svg":
+        work = ElementTree.parse(path).find(".//{http://creativecommons.org/ns#}Work")
+        assert work.findtext("{http://purl.org/dc/elements/1.1/}title") == "Heights, in µm"
+        assert work.findtext("{http://purl.org/dc/elements/1.1/}description") == told
+        assert work.find("{http://purl.org/dc/elements/1.1/}date") is None
+    else:
+        assert b"/Subject (" + told.encode() in content
+        assert b"Date" not in content
+
+
+def test_an_animation_says_what_it_is_made_from(data, tmp_path):
+    short = {"as_listed": data["cube"]["as_listed"].isel(time=slice(0, 5))}
+    figures.draw("animation", short, "The throw", 40, [str(tmp_path / "a.gif")], {"study": "mine"})
+    with Image.open(tmp_path / "a.gif") as image:
+        assert image.info["comment"].startswith(
+            f"stiffdice {__version__}; drawing animation; study mine; as_listed".encode()
+        )
 
 
 @pytest.mark.parametrize("title", ["$$", r"$\frac{1}{$ and $5", "a\x1b[2J\u202eb", "two\nlines"])

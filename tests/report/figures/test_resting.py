@@ -76,7 +76,7 @@ def test_the_longest_steps_are_drawn_and_the_shortest_of_them_named(panels, data
     np.testing.assert_allclose(dashes, sorted(2 / np.sqrt([4, 6, 5, 4, 4, 2, 3, 2])))
     lowest = sorted(points[0, 1] for points in plain if points[0, 0] == 0 and points[-1, 0] == 1)
     np.testing.assert_allclose(lowest, [2 / np.sqrt(6), 1], rtol=1e-6)
-    texts = [text.get_text() for text in panels[1].texts]
+    texts = [text.get_text().replace("\n", " ") for text in panels[1].texts]
     assert "solid: limited by face rocking, 0.816" in texts
     assert "corners: limited by face bounce, 1.000" in texts
     assert sorted(text for text in texts if text.startswith("k")) == [f"k = {k}" for k in (2, 2, 3, 4, 4, 5, 6)]

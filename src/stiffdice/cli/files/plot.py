@@ -27,7 +27,7 @@ those of studies (figures.NAME.draw in config/README.md); what is printed names 
 position, energy and, where the cube turns, cube-end (the way that it has come), cube-start, cube-middle and animation.
 """
 
-_ENDINGS = (".png", ".svg", ".pdf")
+_ENDINGS, _MOVING = (".png", ".svg", ".pdf"), ".gif"
 
 
 def add(plot: argparse.ArgumentParser) -> None:
@@ -43,6 +43,8 @@ def add(plot: argparse.ArgumentParser) -> None:
 def call(options: argparse.Namespace) -> None:
     """Draw the file, and say where the figure is."""
     viewer = _viewer() if options.show else []
+    if options.output is not None:
+        common.picture_target("-o", options.output, [*_ENDINGS, _MOVING], options.force, options.file)
 
     # These take about a second to import; a file that is not there is told before.
     from stiffdice.cli.terminal.progress import notes
@@ -69,7 +71,7 @@ def call(options: argparse.Namespace) -> None:
 
 def _target_of(options: argparse.Namespace, drawing: str, names: list[str], moving: bool) -> Path:
     """Return the file to write; raises InputError for one with another ending, and for one that is not ours."""
-    endings = (".gif",) if moving else _ENDINGS
+    endings = (_MOVING,) if moving else _ENDINGS
     path = Path(options.file)
     beside = path.with_name(f"{path.stem}{'' if drawing == names[0] else f'-{drawing}'}{endings[0]}")
     return common.picture_target("-o", options.output or beside, endings, options.force, path)

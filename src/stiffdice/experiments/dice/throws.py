@@ -77,10 +77,7 @@ class Throws:
                 for face, count, share, a, b in zip(die.FACES, self.counts, shares, low, high, strict=True)
             },
             "rest": {rest.name.lower(): count for rest, count in self.rests.items()},
-            "time_to_rest_s": {
-                "median": float(np.median(self.times)),
-                "quantile_99": float(np.quantile(self.times, 0.99)),
-            },
+            "time_to_rest_s": {"median": float(median), "quantile_99": float(slow)},
             "chi_square": value,
             "p_of_a_fair_die": tail,
         }

@@ -22,7 +22,7 @@ _FINE = 2000
 _NUMBERED = 9
 
 _EXTREMES: dict[str, dict[str, Any]] = {
-    "loss": {"color": style.BLUE, "marker": "v", "markersize": 3.5, "markeredgewidth": 0},
+    "loss": {"color": style.BLUE, "marker": "v", "markersize": 3, "markeredgewidth": 0},
     "gain": {"color": style.VERMILION, "marker": "^", "markersize": 2.5, "markeredgewidth": 0},
     "gravity": {"color": style.GREEN, "marker": "o", "markersize": 3.5, "markerfacecolor": "none", "zorder": 3},
 }
@@ -35,19 +35,17 @@ _WORKS = {
 }
 SMALLEST = 1e-5  # [J]; less than a millionth of what the cube has
 
-# Light to dark with the duration, each with a mark of its own.
-_DURATIONS = (("#9ecae1", "v"), ("#4292c6", "o"), ("#08519c", "s"), ("#04244f", "D"), ("#000000", "^"))
-
 
 def bounce_map(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the map of energy gains by ωh and phase above, and the largest and smallest over the phases below."""
     (dataset,) = experiments.values()
-    figure = style.new_figure(title, width=8.6, height=8.2)
+    figure = style.new_figure(title, style.PAGE, 6.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1, 1.25))
     _gains(figure, upper, dataset)
     _extremes(lower, dataset)
+    style.add_legend(figure, lower.get_legend_handles_labels()[0])
     lower.set(xlim=dataset.omega_h.values[[0, -1]], xlabel=style.OMEGA_H)
-    lower.xaxis.set_major_formatter("{x:g}")
+    style.plain_log_ticks(lower.xaxis)
     scene = scene_of(dataset)
     note = (
         f"one bounce, undamped, frictionless, gated, {dataset.attrs['scheme'].replace('_', ' ')}; v = "
@@ -66,7 +64,7 @@ def _gains(figure: Figure, panel: Any, dataset: xr.Dataset) -> None:
     panel.set(xscale="log", ylim=(0.0, 1.0), ylabel="phase of the step at touch-down [1]")
     norm = SymLogNorm(_LINEAR, linscale=0.5, vmin=-_MOST, vmax=_MOST)
     borders = style.borders(scan, logarithmic=True), style.borders(phase)
-    drawn = panel.pcolormesh(*borders, gain, norm=norm, cmap="RdBu_r", rasterized=True)
+    drawn = panel.pcolormesh(*borders, gain, norm=norm, cmap=style.GAINS, rasterized=True)
     panel.grid(visible=False)
     magic = linear_theory.magic_steps(scan[0], scan[-1])
     top = style.top_axis(panel, list(magic.values()), [str(n) if n <= _NUMBERED else "" for n in magic])
@@ -101,14 +99,13 @@ def _extremes(panel: Any, dataset: xr.Dataset) -> None:
     panel.plot(scan[magic], weighed, linestyle="none", label="at a magic step with gravity", **_EXTREMES["gravity"])
     panel.plot(scan, dataset.gravity_theory, ":", color=style.GREEN, linewidth=1.0, label="theory: 2gh/v")
     panel.set_title("Up to the bound, but nothing at a magic step: only gravity is left, and round-off without it")
-    panel.legend(loc="center", bbox_to_anchor=(0.5, 0.34), ncols=2)
 
 
 def energy_budget(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the works of the first bounces on a logarithmic scale, a panel for each contact law."""
     (books,) = experiments.values()
     laws = style.by_law([books])
-    figure = style.new_figure(title, width=9.0, height=1.6 + 2.7 * len(laws))
+    figure = style.new_figure(title, style.PAGE, 1.3 + 2.1 * len(laws))
     panels = figure.subplots(len(laws), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     count = books.sizes["bounce"]
     offsets = (np.arange(count) - (count - 1) / 2) * 0.7 / count
@@ -118,7 +115,7 @@ def energy_budget(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
             values = law[name].values + (law.drag_work.values if name == "damping_work" else 0.0)
             for sign, marker, fill in ((1, "^", color), (-1, "v", "none")):
                 group, bounce = np.nonzero(sign * values > 0)
-                look = {"color": color, "markerfacecolor": fill, "markersize": 5}
+                look = {"color": color, "markerfacecolor": fill, "markersize": 4}
                 panel.plot(group + offsets[bounce], np.abs(values[group, bounce]), marker, **look)
         for edge in range(1, law.sizes["steps"]):
             panel.axvline(edge - 0.5, color=style.FAINT, linewidth=0.8)
@@ -131,14 +128,14 @@ def energy_budget(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels[-1].set_xlim(-0.5, len(labels) - 0.5)
     panels[-1].set_xlabel(
         "number of time steps [1], and ωh; in each group the first bounces from left to right; "
-        f"below {SMALLEST:g} J not shown"
+        f"below {readable(SMALLEST)} J not shown"
     )
     handles = [
         *(style.mark(text, "s", color=color) for color, text in _WORKS.values()),
         style.mark("full, up: energy gained", "^", color=style.INK),
         style.mark("open, down: energy lost", "v", color=style.INK, markerfacecolor="none"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -148,20 +145,19 @@ def apex_edge(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     There is a panel for each experiment and contact law.
     """
     columns = style.by_law(experiments.values())
-    figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=4.2)
+    figure = style.new_figure(title, style.PAGE if len(columns) > 1 else style.COLUMN, 3.0)
     panels = figure.subplots(1, len(columns), sharex=True, sharey=True, squeeze=False)[0]
     for panel, found in zip(panels, columns, strict=True):
         ground = scene_of(found)["ground"]
         numbers = ground_words(stiffness=ground["stiffness"], damping=ground["damping"])
         panel.set_title(f"{style.law_of(found)}, {numbers}")
         heights = found.hop_height.values
-        for k, seconds in enumerate(found.duration.values):
-            color, mark = _DURATIONS[min(k, len(_DURATIONS) - 1)]
-            look = {"color": color, "marker": mark, "markersize": 4, "label": f"runs of {seconds:g} s"}
-            panel.plot(heights, found.last_fail.values[k], **look)
+        looks = style.ordered(found.sizes["duration"])
+        for look, seconds, last in zip(looks, found.duration.values, found.last_fail.values, strict=True):
+            panel.plot(heights, last, **look, markersize=3, label=f"runs of {seconds:g} s")
         panel.plot(heights, found.predicted, label="theory: largest gain × R(H)", **style.THEORY)
         panel.set(xscale="log", yscale="log", ylim=(0.2, 2.0), xlabel="rebounds count from this height on [m]")
         style.plain_log_ticks(panel.yaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
     panels[0].set_ylabel("ωh of the last fail [1]")
-    figure.legend(handles=panels[0].get_lines(), loc="outside lower center", ncols=len(panels[0].get_lines()))
+    style.add_legend(figure, panels[0].get_lines())
     return figure

@@ -17,8 +17,6 @@ _MODELS: dict[str, tuple[str, dict[str, Any]]] = {
     "gibbs": ("Gibbs (Riemer, Stoyan, Obreschkow), β fitted", {"color": style.PURPLE, "linestyle": "--"}),
     "pender_uhrin": ("Pender and Uhrin's 2-D formula", {"color": style.GREEN, "linestyle": "-."}),
 }
-_COLORS = (style.BLUE, style.ORANGE, style.VERMILION, style.PURPLE, style.GREEN)
-_MARKS = "osD^v"
 _ENDS, _ASPECT = "part on one of the two square ends [1]", "c/a [1]"
 _CHI = "χ = d ln p(end pair)/d ln(c/a) [1]"
 _PSI = "ψ = d ln(p/p opposite)/d(offset/side) [1]"
@@ -28,7 +26,7 @@ _SOLID_ANGLE = -1.1027
 def ends(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return how often square boxes land on an end against c/a, on a plain and on a logarithmic axis."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, width=11.4, height=4.9)
+    figure = style.new_figure(title, style.PAGE, 3.3)
     for panel, scale in zip(figure.subplots(1, 2), ("linear", "log"), strict=True):
         _draw_ends(panel, found)
         panel.set(xscale="log", xlabel=_ASPECT, ylabel=_ENDS, yscale=scale)
@@ -47,7 +45,7 @@ def ends(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         handles.append(
             style.mark("steel dice (Mungan and Lipscombe, table 1)", "o", color=style.VERMILION, markersize=4)
         )
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -75,17 +73,17 @@ def _draw_ends(panel: Any, found: xr.Dataset) -> None:
 
 def response(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return χ and ψ against friction, for each restitution and each way of throwing."""
-    figure = style.new_figure(title, width=10.6, height=5.0)
+    figure = style.new_figure(title, style.PAGE, 3.4)
     panels = figure.subplots(1, 2)
     handles, lines = [], ("-", "--", ":", "-.")
     for k, (name, found) in enumerate(experiments.items()):
-        color, mark = _COLORS[k % len(_COLORS)], _MARKS[k % len(_MARKS)]
+        look = style.SERIES[k % len(style.SERIES)]
         for restitution, line in zip(found.restitution.values, lines, strict=False):
             there = found.sel(restitution=restitution)
             shown = zip(panels, ("chi", "psi"), strict=True)
             for panel, coefficient in shown:
-                _with_errors(panel, there, "friction", coefficient, {"color": color, "marker": mark, "linestyle": line})
-        handles.append(style.line(f"{name}: {_launch(found)}", color=color, marker=mark, markersize=4))
+                _with_errors(panel, there, "friction", coefficient, look | {"linestyle": line})
+        handles.append(style.line(f"{name}: {_launch(found)}", markersize=3, **look))
     first = next(iter(experiments.values()))
     handles += [
         style.line(f"e = {e:g}", color=style.QUIET, linestyle=line)
@@ -94,27 +92,26 @@ def response(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel in panels:
         panel.set_xticks(first.friction.values, [f"{mu:g}" for mu in first.friction.values])
     _finish(panels, "friction coefficient μ [1]")
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.add_legend(figure, handles)
     return figure
 
 
 def launches(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return χ and ψ against the spread of the spin, for each speed of the launch."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, width=10.6, height=4.6)
+    figure = style.new_figure(title, style.PAGE, 3.1)
     panels = figure.subplots(1, 2)
     handles = []
-    for k, speed in enumerate(found.speed.values):
-        look = {"color": _COLORS[k % len(_COLORS)], "marker": _MARKS[k % len(_MARKS)]}
+    for look, speed in zip(style.ordered(found.sizes["speed"]), found.speed.values, strict=True):
         for panel, coefficient in zip(panels, ("chi", "psi"), strict=True):
             _with_errors(panel, found.sel(speed=speed), "spin", coefficient, look)
-        handles.append(style.line(f"{speed:g} m/s", markersize=4, **look))
+        handles.append(style.line(f"{speed:g} m/s", markersize=3, **look))
     for panel in panels:
         panel.set_xscale("log")
         panel.minorticks_off()
         panel.set_xticks(found.spin.values, [f"{spin:g}" for spin in found.spin.values])
     _finish(panels, "spread of each component of the spin [rad/s]")
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, title="mean speed along the ground")
+    style.add_legend(figure, handles, "mean speed along the ground")
     style.add_note(
         figure, f"e = {found.attrs['restitution']:g}, μ = {found.attrs['friction']:g}; bars: standard errors"
     )
@@ -122,7 +119,7 @@ def launches(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 
 
 def _with_errors(panel: Any, found: xr.Dataset, axis: str, name: str, look: Mapping[str, Any]) -> None:
-    panel.errorbar(found[axis], found[name], found[f"{name}_error"], markersize=4, linewidth=1.1, capsize=2, **look)
+    panel.errorbar(found[axis], found[name], found[f"{name}_error"], markersize=3, linewidth=0.9, capsize=1.5, **look)
 
 
 def _finish(panels: Any, label: str) -> None:

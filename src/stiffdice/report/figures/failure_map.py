@@ -41,7 +41,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the maps, two for each axis side by side, with theory's limits over them."""
     found = list(experiments.values())
     rows = math.ceil(len(found) / 2)
-    figure = style.new_figure(title, width=13.0, height=0.6 + 3.0 * rows + (1.6 if len(found) % 2 == 0 else 0.0))
+    figure = style.new_figure(title, style.PAGE, 1.6 + 1.9 * rows)
     panels = figure.subplots(rows, 4, squeeze=False).reshape(rows * 2, 2)
     for pair, dataset in zip(panels, found, strict=False):
         for law, panel in enumerate(pair):
@@ -51,9 +51,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     if len(found) % 2:
         for panel in panels[-1]:
             panel.remove()
-        figure.legend(handles=_legend(found), loc="lower left", bbox_to_anchor=(0.55, 0.05)).set_in_layout(False)
-    else:
-        figure.legend(handles=_legend(found), loc="outside lower center", ncols=2)
+    style.add_legend(figure, _legend(found))
     return figure
 
 
@@ -69,8 +67,8 @@ def _map(panel: Any, dataset: xr.Dataset) -> None:
     # A limit is a line through all numbers but zero, and a stroke in each row that stands alone.
     numbers = heights > heights.min() + step if np.diff(np.sort(heights))[:1] > step else np.ones(len(heights), bool)
     for name, limits in zip(meanings_of(dataset.limit), dataset.limit_steps.values, strict=True):
-        look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.3, "label": name}
-        look["path_effects"] = [patheffects.withStroke(linewidth=2.6, foreground="white")]
+        look = {"linestyle": _LIMIT_LOOKS[name]["linestyle"], "color": style.INK, "linewidth": 1.0, "label": name}
+        look["path_effects"] = [patheffects.withStroke(linewidth=2.0, foreground=style.PAPER)]
         panel.plot(limits[numbers], heights[numbers], **look)
         for height, limit in zip(heights[~numbers], limits[~numbers], strict=True):
             panel.plot([limit, limit], [height - step / 2, height + step / 2], **look)
@@ -85,12 +83,16 @@ def _map(panel: Any, dataset: xr.Dataset) -> None:
         shown = [*np.flatnonzero(value.values == 0), *np.flatnonzero(value.values > 0)[::every]]
         panel.set_yticks(heights[shown], [readable(float(value.values[k])) for k in shown])
     panel.set_xlabel("time steps [1]")
-    panel.set_title(f"{dataset.attrs['axis']}, {style.law_of(dataset)}")
+    panel.set_title(f"{dataset.attrs['axis']}, {style.law_of(dataset)}", fontsize=style.SMALL)
 
 
 def _fill(verdict: str) -> dict[str, Any]:
     look = style.VERDICT_LOOKS[verdict]
-    edge = {"edgecolor": style.QUIET, "linewidth": 0.0} if "hatch" in look else {"edgecolor": "white", "linewidth": 0.4}
+    edge = (
+        {"edgecolor": style.QUIET, "linewidth": 0.0}
+        if "hatch" in look
+        else {"edgecolor": style.PAPER, "linewidth": 0.4}
+    )
     return {"facecolor": look["color"], "hatch": look.get("hatch"), **edge}
 
 
@@ -118,5 +120,5 @@ def _legend(found: list[xr.Dataset]) -> list[Any]:
     ]
     for name, look in _LIMIT_LOOKS.items():
         if any(np.isfinite(dataset.limit_steps.values[limits.index(name)]).any() for dataset in found):
-            handles.append(style.line(color=style.INK, linewidth=1.3, **look))
+            handles.append(style.line(color=style.INK, linewidth=1.0, **look))
     return handles

@@ -20,7 +20,7 @@ _EXADEM = math.sqrt(2)
 def impacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the least and largest restitution of an undamped impact against the step over its duration."""
     (dataset,) = experiments.values()
-    figure = style.new_figure(title)
+    figure = style.new_figure(title, height=3.1)
     panel = figure.subplots()
     parts = dataset.part.values
     panel.axvspan(0.1, 0.2, color=style.GREEN, alpha=0.15, linewidth=0)
@@ -30,7 +30,7 @@ def impacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         color, marker, dashes = _LOOKS[force]
         panel.fill_between(parts, dataset.least[k], dataset.largest[k], color=color, alpha=0.15, linewidth=0)
         for ends in (dataset.least[k], dataset.largest[k]):
-            panel.plot(parts, ends, color=color, marker=marker, markersize=4, linestyle=dashes)
+            panel.plot(parts, ends, color=color, marker=marker, markersize=2.5, linestyle=dashes)
     panel.set_xscale("log")
     panel.set_yscale("log")
     panel.set_xlim(parts.min() * 0.85, parts.max() * 1.6)
@@ -38,7 +38,7 @@ def impacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     style.write_beside(panel, "exaDEM's\nπ√(m/k)", (_EXADEM, 0.7), (4, 0))
     style.plain_log_ticks(panel.xaxis)
     style.plain_log_ticks(panel.yaxis)
-    panel.set(xlabel="step over the duration of the impact [1]", ylabel="speed out over speed in, over all phases [1]")
+    panel.set(xlabel="step over the duration of the impact [1]", ylabel="speed out over speed in,\nover all phases [1]")
     handles = [style.line(f"{_NAMES[name]} force", color=look[0], linestyle=look[2]) for name, look in _LOOKS.items()]
-    panel.legend(handles=[*handles, style.line("exact: no damping", **style.THEORY)], loc="upper left")
+    style.add_legend(figure, [*handles, style.line("exact: no damping", **style.THEORY)])
     return figure

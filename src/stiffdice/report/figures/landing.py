@@ -13,33 +13,30 @@ from matplotlib.ticker import NullFormatter
 from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 
-# By place among the experiments.
-_LOOKS = [(style.BLUE, "o"), (style.VERMILION, "s"), (style.GREEN, "D"), (style.ORANGE, "^"), (style.PURPLE, "v")]
-_SCHEMES = {"symplectic_euler": style.BLUE, "velocity_verlet": style.GREEN, "rk4": style.VERMILION}
 # What the issue of coarse steps aims at: a distance of distributions, and a part of the way thrown.
 _DISTANCE, _PATH = 0.003, 0.01
 
 
 def faces(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the probability of each face with its 95 % interval, of every die."""
-    figure = style.new_figure(title, height=3.4)
+    figure = style.new_figure(title, height=2.6)
     panel = figure.subplots()
     panel.axhline(1 / 6, label="fair: 1/6", **style.THEORY)
     for k, (name, dataset) in enumerate(experiments.items()):
-        colour, marker = _LOOKS[k % len(_LOOKS)]
+        look = style.SERIES[k % len(style.SERIES)]
         place = dataset.face.values + 0.12 * (k - (len(experiments) - 1) / 2)
         share = dataset.probability.values
         bars = share - dataset.probability_low.values, dataset.probability_high.values - share
         label = f"{name}, {int(dataset['count'].sum()):,} throws".replace(",", " ", 0)
-        panel.errorbar(place, share, bars, color=colour, marker=marker, markersize=4.5, linestyle="none", label=label)
+        panel.errorbar(place, share, bars, **look, markersize=3, linestyle="none", label=label)
     panel.set(xlabel="face up [pips]", ylabel="probability [1]", xticks=range(1, 7), ylim=(0, None))
-    figure.legend(loc="outside lower center", ncols=3)
+    style.add_legend(figure, panel.get_legend_handles_labels()[0])
     return figure
 
 
 def coarse_steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return total variation, changed faces and error of paths against force evaluations, a column for each scene."""
-    figure = style.new_figure(title, width=3.0 * len(experiments) + 0.6, height=7.2)
+    figure = style.new_figure(title, style.PAGE if len(experiments) > 1 else style.COLUMN, 6.0)
     panels = figure.subplots(3, len(experiments), sharey="row", sharex="col", squeeze=False)
     for column, (name, dataset) in enumerate(experiments.items()):
         _distributions(panels[0, column], dataset)
@@ -51,13 +48,14 @@ def coarse_steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         panels[2, column].set_xlabel("force evaluations of a throw [1]")
     for row, text in enumerate(("total variation of faces [1]", "share of faces changed [1]", "error of the path [1]")):
         panels[row, 0].set_ylabel(text)
+    schemes = dict.fromkeys(name for found in experiments.values() for name in meanings_of(found.scheme))
     handles = [
         style.mark("faces: symplectic Euler, numbers are ωh", color=style.BLUE, marker="o"),
         style.area("two samples of one distribution: 95 % are below", style.FAINT),
-        *(style.line(f"paths: {name.replace('_', ' ')}", color=colour) for name, colour in _SCHEMES.items()),
+        *(style.line(f"paths: {name.replace('_', ' ')}", markersize=3, **style.METHOD_LOOKS[name]) for name in schemes),
         style.line(f"aims: {_DISTANCE:g} of faces, {_PATH:.0%} of a path", color=style.QUIET, linestyle=":"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -65,10 +63,10 @@ def _distributions(panel: Any, dataset: xr.Dataset) -> None:
     work, distance = dataset.evaluations.values, dataset.total_variation.values
     order = np.argsort(work)
     panel.fill_between(work[order], 1e-4, dataset.sampling_95.values[order], color=style.FAINT, linewidth=0)
-    panel.plot(work[order], distance[order], color=style.BLUE, marker="o", markersize=4)
+    panel.plot(work[order], distance[order], color=style.BLUE, marker="o", markersize=3)
     for k, (x, y, value) in enumerate(zip(work, distance, dataset.omega_h.values, strict=True)):
         aside = (3, 4) if k % 2 else (-3, -11)  # neighbours may be near
-        panel.annotate(f"{value:g}", (x, y), xytext=aside, textcoords="offset points", fontsize=7)
+        panel.annotate(f"{value:g}", (x, y), xytext=aside, textcoords="offset points", fontsize=style.SMALL)
     panel.axhline(_DISTANCE, color=style.QUIET, linewidth=0.8, linestyle=":")
     panel.set(xscale="log", yscale="log", ylim=(2e-4, 1))
     panel.xaxis.set_minor_formatter(NullFormatter())
@@ -77,6 +75,6 @@ def _distributions(panel: Any, dataset: xr.Dataset) -> None:
 def _paths(panel: Any, dataset: xr.Dataset, name: str) -> None:
     for k, scheme in enumerate(meanings_of(dataset.scheme)):
         work, values = dataset.path_evaluations.values[k], dataset[name].values[k]
-        panel.plot(work, values, color=_SCHEMES[scheme], marker="s", markersize=3.5)
+        panel.plot(work, values, markersize=3, **style.METHOD_LOOKS[scheme])
     if name == "face_changed":
         panel.set_ylim(0, 1)

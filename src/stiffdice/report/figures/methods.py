@@ -25,27 +25,6 @@ from stiffdice.report.number_format import ground_words, readable
 from stiffdice.report.tables.methods import ERRORS, OFF, Found, engines_note, found_in, limit_of, name_of, within
 from stiffdice.simulation.engines.registry import METHODS, PEERS
 
-# Of a method: colour and mark.
-_LOOKS: dict[str, dict[str, Any]] = {
-    "symplectic_euler": {"color": style.BLUE, "marker": "o"},
-    "forward_euler": {"color": style.ORANGE, "marker": "v"},
-    "velocity_verlet": {"color": "#56B4E9", "marker": "s"},
-    "rk4": {"color": style.PURPLE, "marker": "D"},
-    "implicit_euler": {"color": "#997700", "marker": "^"},
-    "exact": {"color": style.GREEN, "marker": "*"},
-    "event": {"color": style.VERMILION, "marker": "P"},
-    "scipy_dop853": {"color": style.QUIET, "marker": "<"},
-    "scipy_lsoda": {"color": style.INK, "marker": ">"},
-    "scipy_radau": {"color": "#a9a9a9", "marker": "x"},
-    "mujoco": {"color": style.BLUE, "marker": "d"},
-    "pybullet": {"color": style.ORANGE, "marker": "h"},
-    "drake": {"color": style.PURPLE, "marker": "p"},
-    "dart": {"color": "#997700", "marker": "H"},
-    "scipy": {"color": style.INK, "marker": ">"},
-    "octave": {"color": style.GREEN, "marker": "X"},
-    "numpy": {"color": style.VERMILION, "marker": "+"},
-}
-
 # Panels side by side at most: methods, or stiffnesses from the softest to the stiffest.
 _COLUMNS = 3
 _ERROR_LABELS = {
@@ -59,11 +38,11 @@ _WORST = 10.0
 # The scheme whose cost the √S law is drawn through, at the softest ground.
 _LAW_OF = "symplectic_euler"
 _LAW: dict[str, Any] = {"color": style.INK, "linestyle": ":", "linewidth": 1.0}
-_MORE: dict[str, Any] = {"marker": r"$\uparrow$", "markersize": 9}
+_MORE: dict[str, Any] = {"marker": r"$\uparrow$", "markersize": 6}
 
 # Restitutions above are given by an arrow.
 _HIGHEST = 3.2
-_STAYS: dict[str, Any] = {"marker": "x", "markersize": 5, "color": style.INK}
+_STAYS: dict[str, Any] = {"marker": "x", "markersize": 3.5, "color": style.INK}
 
 _COLORS = (style.BLUE, style.ORANGE)
 _HATCH = "////"
@@ -76,8 +55,8 @@ _REFERENCE: dict[str, Any] = {"color": style.INK, "linewidth": 2.5, "alpha": 0.3
 def look_of(method: str) -> dict[str, Any]:
     """Return colour, mark and line of a method: our schemes full, engines and solvers dashed."""
     dashes = "--" if method in PEERS else "-"
-    mark = _LOOKS.get(method, {"color": style.QUIET, "marker": "."})
-    return mark | {"linestyle": dashes, "linewidth": 1.0, "markersize": 6 if method == "exact" else 4}
+    mark = style.METHOD_LOOKS.get(method, {"color": style.QUIET, "marker": "."})
+    return mark | {"linestyle": dashes, "linewidth": 0.9, "markersize": 4.5 if method == "exact" else 3}
 
 
 def _lines(methods: Iterable[str]) -> list[Line2D]:
@@ -107,7 +86,7 @@ def _errors(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
             panel.axhspan(low, high, color=style.QUIET, alpha=0.25, linewidth=0)
             panel.axhline(low, color=style.QUIET, linewidth=0.8)
             panel.set_ylim(lowest / 2, 2 * _WORST)
-            panel.set_title(f"{PROBLEMS[found.problem].name}, {ground_words(stiffness=float(here.stiffness))}")
+            panel.set_title(f"{PROBLEMS[found.problem].name}\n{ground_words(stiffness=float(here.stiffness))}")
             panel.set_xlabel("force evaluations [1]" if found.seconds is None else "median wall time [s]")
         line[0].set_ylabel(_ERROR_LABELS[measure])
     more = [style.area("round-off: in the launch (line) … in a contact's depth", style.QUIET, alpha=0.25)]
@@ -133,7 +112,7 @@ def _costs(data: Mapping[str, xr.Dataset], title: str, measure: str) -> Figure:
                 if method == _LAW_OF and known.size:
                     law = values[known[0]] * np.sqrt(stiffness / stiffness[known[0]])
                     panel.plot(stiffness, law, zorder=1, **_LAW)
-            panel.set_title(f"{PROBLEMS[found.problem].name}, {measure} to {_BOUND_LABELS[bound]}")
+            panel.set_title(f"{PROBLEMS[found.problem].name}\n{measure} to {_BOUND_LABELS[bound]}")
         line[0].set_ylabel("wall time [s]" if timed else "force evaluations [1]")
     for panel in panels[-1]:
         panel.set_xlabel(style.STIFFNESS)
@@ -149,7 +128,7 @@ cost_position, cost_restitution, cost_energy = (partial(_costs, measure=measure)
 
 
 def _grid(title: str, rows: list[Found], columns: int, sharex: Any) -> tuple[Figure, Any]:
-    figure = style.new_figure(title, width=12.0, height=3.1 * len(rows) + 1.4)
+    figure = style.new_figure(title, style.PAGE, 2.1 * len(rows) + 1.4)
     panels = figure.subplots(len(rows), columns, sharex=sharex, sharey="row", squeeze=False)
     for panel in panels.flat:
         panel.set(xscale="log", yscale="log")
@@ -159,7 +138,7 @@ def _grid(title: str, rows: list[Found], columns: int, sharex: Any) -> tuple[Fig
 def _legend(figure: Figure, rows: list[Found], more: Iterable[Any], note: str | None = None) -> None:
     names = dict.fromkeys(name for found in rows for name in found.methods)
     handles = [*_lines(names), *more]
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, title=note or None, title_fontsize=7.5)
+    style.add_legend(figure, handles, note or "")
 
 
 def _hollow(label: str, **look: Any) -> Any:
@@ -179,7 +158,7 @@ def engine_limits(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     (found,) = experiments.values()
     names = meanings_of(found.method)
     lines = math.ceil(len(names) / _COLUMNS)
-    figure = style.new_figure(title, width=12.0, height=2.1 * lines + 1.0)
+    figure = style.new_figure(title, style.PAGE, 1.5 * lines + 1.5)
     panels = figure.subplots(lines, _COLUMNS, sharex=True, sharey=True, squeeze=False)
     for k, (name, panel) in enumerate(zip(names, panels.flat, strict=False)):
         _bounce(panel, found.isel(method=k), limit_of(found.omega_h.values, within(found, k, OFF[-1])).passes)
@@ -192,14 +171,14 @@ def engine_limits(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel in panels[:, 0]:
         panel.set_ylabel("restitution e [1]")
     handles = [
-        style.area("least to most over\nthe phases of the step\nat touch-down", style.BLUE, alpha=0.35),
+        style.area("least to most over the phases of the step at touch-down", style.BLUE, alpha=0.35),
         style.line("exact", **style.THEORY),
         style.area(f"within {OFF[-1]:.0%} of it", style.FAINT),
-        style.line("all phases within,\nup to here", color=style.GREEN),
-        style.line("ωh = 2: symplectic Euler's\nlimit of stability", color=style.VERMILION, linestyle=":"),
-        style.mark("at some phase it does\nnot leave the ground", **_STAYS),
+        style.line("all phases within, up to here", color=style.GREEN),
+        style.line("ωh = 2: symplectic Euler's limit of stability", color=style.VERMILION, linestyle=":"),
+        style.mark("at some phase it does not leave the ground", **_STAYS),
     ]
-    figure.legend(handles=handles, loc="outside right center")
+    style.add_legend(figure, handles)
     style.add_note(figure, engines_note([found]))
     return figure
 
@@ -233,7 +212,7 @@ def engine_throw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return three panels: height, distance over time, distance over effort."""
     (found,) = experiments.values()
     names = meanings_of(found.method)
-    figure = style.new_figure(title, width=12.5, height=4.6)
+    figure = style.new_figure(title, style.PAGE, 3.4)
     left, middle, right = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.0])
     height = found.reference_position.values[:, 2]
     left.plot(found.time, height, **_REFERENCE)
@@ -256,11 +235,11 @@ def engine_throw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     span = np.ptp(height)
     left.set_ylim(height.min() - 0.1 * span, height.max() + 0.15 * span)
     middle.set(yscale="log", ylim=_SPAN, xlabel="time [s]", ylabel="distance from the reference [m]")
-    middle.set_title("distance, at the most effort (grey: the reference's own)")
+    middle.set_title("distance, at the most effort\n(grey: the reference's own)")
     right.set(xscale="log", yscale="log", xlabel="force evaluations [1]", ylabel="distance from the reference [m]")
     right.set_title(f"after the first landing, t = {float(found.time[contact]):.2f} s")
-    reference = style.line(f"reference:\n{found.attrs['reference']}", **_REFERENCE)
-    figure.legend(handles=[reference, *_lines(names)], loc="outside right center")
+    reference = style.line(f"reference: {found.attrs['reference']}", **_REFERENCE)
+    style.add_legend(figure, [reference, *_lines(names)])
     unfit = found.attrs.get("unfit", "")
     parts = [f"At the most: {', '.join(efforts)}.", engines_note([found]), f"Cannot: {unfit}." if unfit else ""]
     style.add_note(figure, " ".join(parts).strip())
@@ -273,23 +252,23 @@ def engine_speed(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     names, problems = meanings_of(found.method), meanings_of(found.problem)
     rates = found.taken.values / found.seconds.values
     order = np.argsort(np.nan_to_num(np.nanmax(rates, axis=0)))
-    figure = style.new_figure(title, width=8.5, height=0.5 * len(names) + 1.7)
+    figure = style.new_figure(title, height=0.32 * len(names) + 2.0)
     panel = figure.subplots()
     thick = 0.8 / len(problems)
     hatches = [_HATCH if METHODS[names[k]].own_steps else None for k in order]
     for p, color in zip(range(len(problems)), _COLORS, strict=False):
         across = np.arange(len(names)) + (len(problems) - 1 - 2 * p) / 2 * thick
-        look: dict[str, Any] = {"color": color, "edgecolor": "white", "linewidth": 0.5, "hatch": hatches}
+        look: dict[str, Any] = {"color": color, "edgecolor": style.PAPER, "linewidth": 0.5, "hatch": hatches}
         bars = panel.barh(across, rates[p, order], thick, **look)
         texts = ["" if np.isnan(rate) else readable(rate, digits=2) for rate in rates[p, order]]
-        panel.bar_label(bars, texts, padding=3, fontsize=7.5)
+        panel.bar_label(bars, texts, padding=2, fontsize=style.SMALL)
     panel.set_yticks(range(len(names)), [name_of(names[k]) for k in order])
     panel.set(xscale="log", xlabel="steps a second [1/s]", xlim=(np.nanmin(rates) / 3, np.nanmax(rates) * 5))
     panel.grid(visible=False, axis="y")
     handles = [style.area(PROBLEMS[name].name, color) for color, name in zip(_COLORS, problems, strict=True)]
-    own: dict[str, Any] = {"facecolor": "white", "edgecolor": style.QUIET, "hatch": _HATCH}
+    own: dict[str, Any] = {"facecolor": style.PAPER, "edgecolor": style.QUIET, "hatch": _HATCH}
     handles.append(Patch(label="force evaluations: takes its own steps", **own))
-    panel.legend(handles=handles, loc="lower right")
+    style.add_legend(figure, handles)
     machine = f"One thread of {found.attrs['machine_processor']}, medians of warm runs."
     style.add_note(figure, f"{machine} {engines_note([found])}")
     return figure

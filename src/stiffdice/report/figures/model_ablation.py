@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,8 +14,6 @@ from stiffdice.io.cf_enums import meanings_of
 from stiffdice.report.figures import style
 from stiffdice.report.number_format import duration, ground_words, scene_of
 
-# Of a friction coefficient, in ascending order; more of them begin anew.
-_COLORS = ("#56B4E9", style.BLUE, style.GREEN, style.ORANGE, style.VERMILION, style.PURPLE)
 # A difference is drawn hollow unless it is so many times what the runs themselves are off by.
 _CLEAR = 3.0
 # By approximation: sliding, and sliding without friction.
@@ -43,11 +40,11 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """
     (dataset,) = experiments.values()
     laws = style.by_law([dataset])
-    figure = style.new_figure(title, width=12.4, height=3.3 * len(laws) + 1.0)
+    figure = style.new_figure(title, style.PAGE, 2.2 * len(laws) + 1.2)
     rows = figure.subplots(len(laws), 3, sharex=True, squeeze=False)
     rough = dataset.friction.values[dataset.friction.values > 0].tolist()
-    looks = itertools.cycle({"color": color, "marker": mark} for color, mark in zip(_COLORS, "osD^vP", strict=True))
-    looks_of = {mu: {**look, "markersize": 4, "linewidth": 1.0} for mu, look in zip(rough, looks, strict=False)}
+    looks = zip(rough, style.ordered(len(rough)), strict=True)
+    looks_of = {mu: {**look, "markersize": 3, "linewidth": 0.9} for mu, look in looks}
     for there, row in zip(laws, rows, strict=True):
         for panel, name in zip(row, ("error", "parting", "spin"), strict=True):
             panel.set(xscale="log", title=f"{style.law_of(there)}: {name}")
@@ -61,7 +58,7 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         style.line("theory, small μ", **style.THEORY),
         style.line("second landing, μ = 0", **style.THEORY | {"color": style.QUIET}),
     ]
-    figure.legend(handles=handles, loc="outside right center")
+    style.add_legend(figure, handles)
     launch = scene_of(dataset)["launch"]
     style.add_note(
         figure,
@@ -82,7 +79,7 @@ def _draw_law(row: Any, there: xr.Dataset, looks: Mapping[float, Any]) -> None:
             clear = error > _CLEAR * found.numerical_error.values
             errors.plot(stiffness, error, **look | {"linestyle": line, "marker": ""})
             errors.plot(stiffness[clear], error[clear], **look | {"linestyle": "none"})
-            errors.plot(stiffness[~clear], error[~clear], **look, linestyle="none", markerfacecolor="white")
+            errors.plot(stiffness[~clear], error[~clear], **look, linestyle="none", markerfacecolor=style.PAPER)
             partings.plot(stiffness, found.parting_time[a], **look, linestyle=line)
         spins.plot(stiffness, found.spin / mu, **look)
     errors.set(yscale="log", ylabel="distance just before the second landing [m]")
@@ -97,7 +94,7 @@ def _draw_law(row: Any, there: xr.Dataset, looks: Mapping[float, Any]) -> None:
 
 def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return how many times longer the model with a piece takes than the one without it, where no one needs it."""
-    figure = style.new_figure(title, width=4.6 * len(timings) + 1.4, height=5.4)
+    figure = style.new_figure(title, style.PAGE, 3.6)
     panels = figure.subplots(1, len(timings), sharex=True, sharey=True, squeeze=False)[0]
     for panel, dataset in zip(panels, timings.values(), strict=True):
         for k, (kind, (_, color)) in enumerate(_KINDS.items()):
@@ -107,7 +104,7 @@ def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
             for place, ratio, (full, least) in zip(places, ratios, dataset[f"{kind}_time"].values, strict=True):
                 if np.isfinite(ratio):
                     text = f" {ratio:.3g}×: {duration(full)} / {duration(least)}"
-                    panel.text(max(1.0, ratio), place, text, va="center", fontsize=7.5)
+                    panel.text(max(1.0, ratio), place, text, va="center", fontsize=style.SMALL)
         panel.axvline(1.0, color=style.INK, linewidth=0.8)
         most = float(np.nanmax([dataset[f"{kind}_ratio"] for kind in _KINDS]))
         panel.set(xscale="log", xlim=(0.6, 40 * max(4.0, most)), xlabel="time with the piece over time without it [1]")
@@ -119,6 +116,6 @@ def draw_times(timings: Mapping[str, xr.Dataset], title: str) -> Figure:
     pieces = meanings_of(next(iter(timings.values())).piece)
     panels[0].set_yticks(range(len(pieces)), [_PIECE_WORDS[name] for name in pieces])
     panels[0].invert_yaxis()
-    handles = [style.line(text, color=color, linewidth=6) for text, color in _KINDS.values()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    handles = [style.line(text, color=color, linewidth=5) for text, color in _KINDS.values()]
+    style.add_legend(figure, handles)
     return figure

@@ -43,7 +43,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     found = {name: scans(data) for name, data in sweeps.items()}
     broken = [column for column in columns if any((parts[column].shares < 1).any() for parts in found.values())]
     laws = list(dict.fromkeys(column.contact for column in columns))
-    figure = style.new_figure(title, width=5.0 * len(laws) + 0.4, height=11.4)
+    figure = style.new_figure(title, style.PAGE if len(laws) > 1 else style.COLUMN, 8.6)
     panels = figure.subplots(4, len(laws), sharey="row", squeeze=False, height_ratios=(1.15, 1.15, 1, 0.7))
     limits = first.limit.values * linear_theory.STABILITY_LIMIT
     products = dict(zip(first.stiffness.values.tolist(), limits, strict=True))
@@ -59,7 +59,7 @@ def draw(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel, label in zip(panels[:, 0], labels, strict=True):
         panel.set_ylabel(label)
     criteria = dict.fromkeys(column.criterion for column in broken)
-    figure.legend(handles=_legend(sweeps, criteria), loc="outside lower center", ncols=2)
+    style.add_legend(figure, _legend(sweeps, criteria))
     return figure
 
 
@@ -110,7 +110,7 @@ def _shares(panel: Any, columns: list[Column], found: _Scans, products: Mapping[
             aside = centres * (1 + 0.012 * (2 * k - len(found)))
             bars = np.stack([mean - low, high - mean]).clip(0)
             panel.errorbar(aside, mean, bars, linestyle="none", elinewidth=0.9, zorder=3, **_open(look, markersize=3))
-    panel.set_title(f"{column.criterion}, {ground_words(stiffness=stiffest)}", fontsize=8.5)
+    panel.set_title(f"{column.criterion}, {ground_words(stiffness=stiffest)}")
     panel.set_xlim(product / np.exp(ends[-1]), product / np.exp(ends[0]))
     style.plain_log_ticks(panel.xaxis)
 

@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -21,24 +20,22 @@ from stiffdice.report.number_format import ground_words, readable, scene_of
 
 # One look for each contact mode, smaller from one to the next: all that lie on one point show.
 _MODES: dict[str, dict[str, Any]] = {
-    "face_bounce": {"color": style.BLUE, "marker": "o", "markersize": 12.0},
-    "face_rocking": {"color": style.VERMILION, "marker": "s", "markersize": 8.0},
-    "edge": {"color": style.GREEN, "marker": "D", "markersize": 5.0},
-    "corner": {"color": style.INK, "marker": "^", "markersize": 3.0},
+    "face_bounce": {"color": style.BLUE, "marker": "o", "markersize": 9.0},
+    "face_rocking": {"color": style.VERMILION, "marker": "s", "markersize": 6.5},
+    "edge": {"color": style.GREEN, "marker": "D", "markersize": 4.0},
+    "corner": {"color": style.INK, "marker": "^", "markersize": 2.5},
 }
 # A pale mark within an outline: two inertias at one point show, too.
 _FILLS: dict[str, dict[str, Any]] = {
     "corners": {"alpha": 0.3, "markeredgewidth": 0, "zorder": 2.5},
     "solid": {"markerfacecolor": "none", "markeredgewidth": 1.0, "zorder": 3},
 }
-# By friction.
-_CHATTER = [(style.BLUE, "o"), (style.VERMILION, "s"), (style.GREEN, "D"), (style.ORANGE, "^"), (style.PURPLE, "v")]
 
 
 def rocking(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return limits against damping, the longest step of each mode, and the growth of a nudge around the limit."""
     (dataset,) = experiments.values()
-    figure = style.new_figure(title, width=11.4, height=4.7)
+    figure = style.new_figure(title, style.PAGE, 3.9)
     left, middle, right = figure.subplots(1, 3)
     _limits(left, dataset)
     _longest_steps(middle, dataset)
@@ -49,7 +46,7 @@ def rocking(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         style.area("filled: corners inertia", style.INK, alpha=0.3),
         style.line("theory", **style.THEORY),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=7)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -62,7 +59,7 @@ def _limits(panel: Any, dataset: xr.Dataset) -> None:
     theory = np.array([linear_theory.stability_limit(value) for value in zeta])
     error = readable(np.abs(dataset.limit.values / theory - 1).max(), digits=2)
     style.write_in_corner(panel, 0.98, f"theory: 2(√(1 + ζ²) − ζ)\nlargest relative difference: {error}")
-    panel.set_title("One limit in units of each mode's own ω")
+    panel.set_title("One limit in units\nof each mode's own ω")
     panel.set(xlabel="damping ratio ζ of the mode [1]", ylabel="measured limit ωh [1]")
 
 
@@ -81,11 +78,14 @@ def _longest_steps(panel: Any, dataset: xr.Dataset) -> None:
         worst, at = int(steps[i].argmin()), steps[i].min()
         color = _MODES[meanings_of(dataset.mode)[worst]]["color"]
         panel.axhline(at, color=color, linewidth=0.8, linestyle=":", zorder=1)
-        text = f"{inertia}: limited by {modes[worst]}, {at:.3f}"
-        style.write_beside(panel, text, (len(modes) - 0.45, at), (0, -6), ha="right", va="top")
+        text = f"{inertia}: limited\nby {modes[worst]}, {at:.3f}"
+        # The higher of the two has its words above, where no mark is.
+        high = at == steps.min(axis=1).max()
+        place, look = ((0.3, at), {"va": "bottom"}) if high else ((len(modes) - 0.45, at), {"ha": "right", "va": "top"})
+        style.write_beside(panel, text, place, (0, 1 if high else -6), **look)
     for (i, inertia), (k, mode) in _named(dataset.inertia, dataset.mode):
         panel.plot([k - 0.25, k + 0.25], [predicted[i, k]] * 2, **style.THEORY)
-        _marks(panel, [k], [steps[i, k]], mode, inertia, markersize=8)
+        _marks(panel, [k], [steps[i, k]], mode, inertia, markersize=6)
     # Two inertias with the same k share a label.
     labels = {(k, round(numbers[i, k])): steps[i, k] for i, k in np.ndindex(steps.shape)}
     for (k, number), step in labels.items():
@@ -105,12 +105,12 @@ def _growths(panel: Any, dataset: xr.Dataset) -> None:
         growth = [linear_theory.growth(part * limit, zeta) for part in fine]
         panel.plot(fine, growth, **style.THEORY)
         for (i, inertia), (k, nudge) in _named(dataset.inertia, dataset.nudge):
-            size = 5 + 2 * (nudge == "bounce")
+            size = 4 + 1.5 * (nudge == "bounce")
             _marks(panel, scan, dataset.growth.values[i, k, z], f"face_{nudge}", inertia, markersize=size)
         style.write_beside(panel, f"ζ = {zeta:g}", (fine[-1], growth[-1]), (-14, 0), ha="right")
     stiffness = scene_of(dataset)["ground"]["stiffness"]
     style.write_in_corner(panel, 0.04, f"{ground_words(stiffness=stiffness)}\ngated, no friction")
-    panel.set_title("A nudge to the cube at rest on its face")
+    panel.set_title("A nudge to the cube\nat rest on its face")
     panel.set(xlabel="ωh over its limit [1]", ylabel="growth of the nudge in a step [1]")
 
 
@@ -124,17 +124,18 @@ def chatter(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     Open marks on the axis are cubes at rest.
     """
     (dataset,) = experiments.values()
-    figure = style.new_figure(title, width=6.4, height=4.6)
+    figure = style.new_figure(title, height=3.4)
     panel: Any = figure.subplots()
     sizes, swings = dataset.step_size.values, dataset.swing.values
     least_swing = dataset.swing_theory.values[dataset.swing_theory.values > 0].min()
     lowest = float(10 ** np.floor(np.log10(least_swing) - 0.5))
     panel.set(xscale="log", yscale="log", ylim=(lowest, 3 * swings.max()))
-    panel.set(xlabel="step size h [s]", ylabel="largest sliding speed of a cube at rest [m/s]")
+    panel.set(xlabel="step size h [s]", ylabel="largest sliding speed\nof a cube at rest [m/s]")
+    looks = style.ordered(dataset.sizes["friction"])
     for k, mu in enumerate(dataset.friction.values):
-        color, marker = _CHATTER[k % len(_CHATTER)]
-        least, rests, size = float(dataset.least_step[k]), swings[k] < lowest, max(3, 8 - 2 * k)
-        look: Any = {"linestyle": "none", "marker": marker, "color": color, "markersize": size, "zorder": 3}
+        color = looks[k]["color"]
+        least, rests, size = float(dataset.least_step[k]), swings[k] < lowest, max(2.5, 5.5 - 1.5 * k)
+        look: Any = {**looks[k], "linestyle": "none", "markersize": size, "zorder": 3}
         panel.plot(sizes[~rests], swings[k, ~rests], label=ground_words(friction=float(mu)), **look)
         panel.plot(sizes[rests], np.full(rests.sum(), lowest), markerfacecolor="none", clip_on=False, **look)
         if least < sizes.max():
@@ -144,8 +145,8 @@ def chatter(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
             look = {"rotation": 90, "ha": "right", "va": "bottom", "color": color}
             style.write_beside(panel, f"{readable(least)} s", (least, lowest), (-2, 12), **look)
     panel.plot([], [], label="theory: μ g h/2 − umin, from h = 2 umin/(μ g) on", **style.THEORY)
-    panel.plot([], [], "o", color=style.QUIET, markerfacecolor="none", label="comes to rest", markersize=5)
-    panel.legend(loc="upper left", fontsize=7.5)
+    panel.plot([], [], "o", color=style.QUIET, markerfacecolor="none", label="comes to rest", markersize=4)
+    style.add_legend(figure, panel.get_legend_handles_labels()[0])
     return figure
 
 
@@ -156,9 +157,9 @@ def held_contacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """
     (dataset,) = experiments.values()
     count, tolerance = dataset.sizes["friction"], dataset.tolerance
-    figure = style.new_figure(title, width=2.6 * count + 1.6, height=6.0)
+    figure = style.new_figure(title, style.PAGE, 4.6)
     rows = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
-    colors = mpl.colormaps["viridis"](np.linspace(0, 0.9, dataset.sizes["stiffness"]))
+    colors = [look["color"] for look in style.ordered(dataset.sizes["stiffness"])]
     for f, column in enumerate(rows.T):
         there, (upper, lower) = dataset.isel(friction=f), column
         for s, color in enumerate(colors):
@@ -170,7 +171,7 @@ def held_contacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         upper.axhline(float(there.reference_error.median()), color=style.QUIET, linestyle=":", linewidth=1.2)
         upper.set(xscale="log", yscale="log", title=ground_words(friction=float(there.friction)))
         lower.set(xscale="log", yscale="log", xlabel="tolerance [1]")
-        lower.xaxis.set_major_locator(LogLocator(numticks=6))
+        lower.xaxis.set_major_locator(LogLocator(numticks=4))
         lower.xaxis.set_minor_formatter(NullFormatter())
     rows[0, 0].set_ylabel("error of the position [r]")
     rows[1, 0].set_ylabel("force evaluations [1]")
@@ -182,6 +183,6 @@ def held_contacts(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         style.line("the tolerance itself", **style.THEORY),
         style.line("LSODA from LSODA", color=style.QUIET, linestyle=":"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    style.add_legend(figure, handles)
     style.add_note(figure, f"lines: medians of {dataset.sizes['launch']} launches; error: distance from LSODA at 1e-13")
     return figure

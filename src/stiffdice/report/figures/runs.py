@@ -73,7 +73,7 @@ die_animation = partial(animation, pips=True)
 
 def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Callable[[int], list[Any]]]:
     """Return a figure with the ground in 3-D axes, equal in scale, and a function that shows the cubes at a sample."""
-    figure = style.new_figure(title, height=3.2)
+    figure = style.new_figure(title, style.PAGE, 3.2)
     figure.set_layout_engine("none")
     style.add_note(figure, describe(run, law=True))
     axes: Any = figure.add_axes((-0.26, -0.22, 1.44, 1.44), projection="3d", computed_zorder=False)
@@ -87,11 +87,9 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
     low[1], high[1] = min(low[1], middle - 3 * unit), max(high[1], middle + 3 * unit)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
     sizes = high[0] - low[0], high[1] - low[1], high[2]
+    axes.set_box_aspect(sizes, zoom=_zoom_to_fit(sizes))
     if "cube" in run.dims:
-        axes.set_box_aspect(sizes, zoom=_zoom_to_fit(sizes))
         axes.locator_params(axis="x", nbins=6)
-    else:
-        axes.set_box_aspect(sizes, zoom=1.25 if sizes[0] > 4 * sizes[1] else 1.0)
     axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     # The plane n·x = 0 under the run, with a grid of two units.
     nx, ny, nz = scene_of(run)["ground"]["normal"]
@@ -99,7 +97,7 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
         lines = [np.arange(low[k] // (2 * unit) * 2 * unit + 2 * unit, high[k], 2 * unit) for k in (0, 1)]
         x, y = np.meshgrid(*([low[k], *lines[k], high[k]] for k in (0, 1)))
         z = -(nx * x + ny * y) / nz
-        look: dict[str, Any] = {"color": "#f3eee4", "edgecolor": style.FAINT, "linewidth": 0.6, "shade": False}
+        look: dict[str, Any] = {"color": style.EARTH, "edgecolor": style.FAINT, "linewidth": 0.6, "shade": False}
         axes.plot_surface(x, y, z, rstride=1, cstride=1, zorder=0, clip_on=False, **look)
         border = [0, 0, -1, -1, 0], [0, -1, -1, 0, 0]
         axes.plot(x[border], y[border], z[border], color=style.QUIET, linewidth=1.0, zorder=1, clip_on=False)
@@ -112,7 +110,7 @@ def _stage(run: xr.Dataset, title: str, pips: bool = False) -> tuple[Figure, Cal
     wide = 2 * unit if high[1] - low[1] < 10 * unit else 5 * unit
     axes.set_yticks(np.arange(np.ceil(low[1] / wide) * wide, high[1] + unit / 2, wide))
     axes.set_zticks([0, 2 * unit, 4 * unit] if high[2] < 8 * unit else np.arange(0, high[2] + unit / 2, 5 * unit))
-    axes.tick_params(labelsize=7.5, pad=-1)
+    axes.tick_params(labelsize=style.SMALL, pad=-1)
     shown = [_body(axes, places[:, k], nodes[:, k], _COLOURS[k], pips) for k in range(places.shape[1])]
     return figure, lambda sample: [artist for show in shown for artist in show(sample)]
 
@@ -183,15 +181,17 @@ def position(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return x, y and z of the centre of mass against time; y only where the cube leaves the plane y = 0."""
     leaves_plane = any(np.abs(run.position[:, 1]).max() > 1e-9 for run in runs.values())
     shown = (0, 1, 2) if leaves_plane else (0, 2)
-    figure = style.new_figure(title, height=1.4 + 1.35 * len(shown))
+    figure = style.new_figure(title, height=1.1 + 0.85 * len(shown))
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for panel, k in zip(panels, shown, strict=True):
         for preset, run in runs.items():
             panel.plot(run.time, run.position[:, k], **style.PRESET_LOOKS[preset])
         panel.set_ylabel(f"{'xyz'[k]} [m]")
     panels[-1].axhline(0, color=style.INK, linewidth=0.8, linestyle=":")
-    panels[-1].annotate("ground", (0.005, 0), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=7.5)
-    panels[0].legend(ncols=3, loc="upper left")
+    panels[-1].annotate(
+        "ground", (0.005, 0), xycoords=("axes fraction", "data"), ha="left", va="bottom", fontsize=style.SMALL
+    )
+    style.add_legend(figure, panels[0].get_legend_handles_labels()[0])
     return _finish(figure, panels[-1], runs)
 
 
@@ -201,17 +201,20 @@ def energy(runs: Mapping[str, xr.Dataset], title: str) -> Figure:
     The mechanical one takes the velocity at the time of the place; files of before format 1.3 lack it, and get the sum
     of the stored energies.
     """
-    figure = style.new_figure(title, height=1.3 + 1.75 * len(runs))
+    figure = style.new_figure(title, height=1.2 + 1.0 * len(runs))
     panels = figure.subplots(len(runs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for panel, (preset, run) in zip(panels, runs.items(), strict=True):
         look = style.PRESET_LOOKS[preset]
         full = run.get("mechanical_energy", run.energy_paper + run.elastic_energy)
         panel.axhline(float(full[0]), color=style.INK, linewidth=0.8, linestyle=":", label="energy at launch")
-        panel.plot(run.time, full, color=style.INK, linewidth=2.4, label="mechanical: with the springs")
+        panel.plot(run.time, full, color=style.INK, linewidth=2.0, label="mechanical: with the springs")
         panel.plot(run.time, run.energy_paper, color=look["color"], label="paper's: kinetic + m g z", zorder=3)
         panel.set_title(look["label"])
         panel.set_ylabel("energy [J]")
-        panel.legend(ncols=3, loc="lower right", bbox_to_anchor=(1, 0.97), borderaxespad=0)
+    handles = panels[0].get_legend_handles_labels()[0][:2]
+    looks = [style.PRESET_LOOKS[preset] for preset in runs]
+    handles += [style.line(f"paper's, {look['label']}: kinetic + m g z", color=look["color"]) for look in looks]
+    style.add_legend(figure, handles)
     lowest = min(0.0, *(float(run.energy_paper.min()) for run in runs.values()))
     panels[0].set_ylim(bottom=lowest)  # after all is drawn: it ends the automatic scaling
     return _finish(figure, panels[-1], runs)

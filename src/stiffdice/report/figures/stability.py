@@ -33,18 +33,18 @@ _NOT_ASKED: dict[str, Any] = {"ha": "center", "color": style.QUIET}
 # The paper's step counts at high stiffness, by the figures that show them; and that stiffness [kg/s²] and duration [s].
 PAPER_STEPS = {"figures 9 and 10": 10_000, "figures 11 and 12": 20_000}
 PAPER_SCENE = 1e6, 10.0
-_PAPER_LOOK: dict[str, Any] = {"marker": "^", "color": style.INK, "markersize": 6}
+_PAPER_LOOK: dict[str, Any] = {"marker": "^", "color": style.INK, "markersize": 4.5}
 _MAGIC_LOOK: dict[str, Any] = {"color": style.INK, "linewidth": 0.8, "linestyle": ":"}
 
 # Labelled on top of pass fractions; and widths of their lines, by criterion: the first is the widest, so that all show.
 _OMEGA_H = (4.0, 3.0, 2.0, 1.5, 1.2, 1.0, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1)
-_WIDTHS = (3.6, 2.8, 1.8, 1.2, 0.7)
+_WIDTHS = (3.0, 2.4, 0.8, 1.2, 0.7)
 
 
 def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return steps against stiffness above, and the same edges as ωh below, a column for each sweep and contact law."""
     columns = style.by_law(sweeps.values())
-    figure = style.new_figure(title, width=4.2 * len(columns) + 0.6, height=7.4)
+    figure = style.new_figure(title, style.PAGE if len(columns) > 1 else style.COLUMN, 5.8)
     panels = figure.subplots(2, len(columns), sharex=True, sharey="row", squeeze=False)
     for (upper, lower), frontier in zip(panels.T, columns, strict=True):
         model = "" if len(sweeps) == 1 else _MODELS.get(frontier.attrs["model"], frontier.attrs["model"]) + ", "
@@ -60,12 +60,12 @@ def steps_needed(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     for criterion, part in found.items():
         look = style.CRITERION_LOOKS[criterion]
         words = style.criterion_words(criterion, float(part.tolerance), columns[0].attrs.get("hop_height"))
-        open_mark = {"color": look["color"], "markersize": 5.5, "markerfacecolor": "none"}
+        open_mark = {"color": look["color"], "markersize": 4.5, "markerfacecolor": "none"}
         handles.append(style.mark(f"first pass: {words}", look["first"], **open_mark))
-        handles.append(style.mark(f"last fail: {words}", look["last"], color=look["color"], markersize=4))
+        handles.append(style.mark(f"last fail: {words}", look["last"], color=look["color"], markersize=3))
     handles.append(style.line("theory: ωh = 2", **style.THEORY))
     handles.append(style.area("scanned cell, darker: more fail", style.QUIET))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3 if len(columns) > 1 else 1)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -85,18 +85,18 @@ def _steps(panel: Any, frontier: xr.Dataset) -> None:
             panel.fill_between(stiffness, low, high, color=look["color"], alpha=0.25, linewidth=0)
             panel.plot(stiffness, fit["factor"] * stiffness ** fit["exponent"], color=look["color"], linewidth=0.8)
             digits = 3 if fit["exponent_error"] >= 5e-4 else 4
-            power = rf"$S^{{\,{fit['exponent']:.{digits}f}\pm{fit['exponent_error']:.{digits}f}}}$"
-            notes.append((f"{criterion}: last fail ∝ {power}", look["color"]))
+            power = f"{fit['exponent']:.{digits}f} ± {fit['exponent_error']:.{digits}f}"
+            notes.append((f"{criterion}: last fail ∝ S to the {power}", look["color"]))
     whole = sorted(set(meanings_of(frontier.criterion)) - set(broken))
     notes += [(f"{name}: every member passes in every cell", style.QUIET) for name in whole]
     for k, (note, color) in enumerate(notes):
-        panel.text(0.03, 0.97 - 0.06 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=8)
+        panel.text(0.03, 0.97 - 0.06 * k, note, color=color, transform=panel.transAxes, va="top", fontsize=style.SMALL)
 
 
 def _marks(panel: Any, stiffness: Any, first: Any, last: Any, look: Mapping[str, str]) -> None:
     """Draw last fail full and first pass open, the open mark larger, so that neither hides the other."""
-    panel.plot(stiffness, last, look["last"], color=look["color"], markersize=3.5, zorder=3)
-    panel.plot(stiffness, first, look["first"], color=look["color"], markersize=5.5, markerfacecolor="none", zorder=4)
+    panel.plot(stiffness, last, look["last"], color=look["color"], markersize=3, zorder=3)
+    panel.plot(stiffness, first, look["first"], color=look["color"], markersize=4.5, markerfacecolor="none", zorder=4)
 
 
 def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
@@ -105,7 +105,14 @@ def _omega_h(panel: Any, frontier: xr.Dataset) -> None:
     scan = frontier.isel(cell=frontier.cell_contact.values == int(frontier.contact))
     failing = 1 - scan.pass_fraction.values.min(axis=0)
     # As a drawing it would be 170 bytes a cell.
-    look: dict[str, Any] = {"s": 2.5, "cmap": "Greys", "vmin": -0.15, "vmax": 1.3, "linewidths": 0, "rasterized": True}
+    look: dict[str, Any] = {
+        "s": 2.5,
+        "cmap": style.CELLS,
+        "vmin": -0.15,
+        "vmax": 1.3,
+        "linewidths": 0,
+        "rasterized": True,
+    }
     panel.scatter(scan.cell_stiffness, scan.cell_omega_h, c=failing, **look)
     panel.axhline(linear_theory.STABILITY_LIMIT, **style.THEORY)
     scale = frontier.limit.values * linear_theory.STABILITY_LIMIT
@@ -133,10 +140,10 @@ def stability_map(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     asked = sorted({pair for found in shares for pair in found}, key=lambda pair: (order.index(pair[0]), pair[1]))
     passed = [pair for pair in asked if not any((found.get(pair, np.ones(1)) < 1).any() for found in shares)]
     rows = [pair for pair in asked if pair not in passed] or asked
-    figure = style.new_figure(title, width=1.8 + 3.0 * len(columns), height=1.4 + 2.5 * len(rows))
+    figure = style.new_figure(title, style.PAGE if len(columns) > 1 else style.COLUMN, 1.2 + 1.9 * len(rows))
     panels = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
     corners = [_rectangles(found) for found in columns]
-    look: Any = {"norm": Normalize(0, 1), "cmap": "cividis", "antialiased": False, "rasterized": True, "zorder": 1}
+    look: Any = {"norm": Normalize(0, 1), "cmap": style.SHARES, "antialiased": False, "rasterized": True, "zorder": 1}
     for pair, row in zip(rows, panels, strict=True):
         for panel, found, cells, given in zip(row, columns, corners, shares, strict=True):
             panel.set(xscale="log", yscale="log")
@@ -152,7 +159,7 @@ def stability_map(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels[0, 0].set(xlim=(sides.min(), sides.max()), ylim=(omega_h.min(), omega_h.max()))
     for panel, found in zip(panels[0], columns, strict=True):
         ground = ground_words(**{name: scene_of(found)["ground"][name] for name in ("damping", "friction")})
-        panel.set_title(f"{found.attrs['model']}, {style.law_of(found)}\n{ground}", fontsize=8.5)
+        panel.set_title(f"{found.attrs['model']}, {style.law_of(found)}\n{ground}", fontsize=style.SMALL)
     for panel in panels[-1]:
         panel.set_xlabel(style.STIFFNESS)
     bar = figure.colorbar(drawn, ax=panels, location="bottom", aspect=50, shrink=0.6, pad=0.02)
@@ -178,15 +185,15 @@ def _rectangles(found: xr.Dataset) -> Array:
 
 def _magic_ticks(panel: Any, found: xr.Dataset, *, numbered: bool) -> None:
     """Draw the limit, and ticks on the right at the magic steps, with their n if `numbered`."""
-    panel.axhline(linear_theory.STABILITY_LIMIT, color="white", linestyle="--", linewidth=1.0)
+    panel.axhline(linear_theory.STABILITY_LIMIT, color=style.PAPER, linestyle="--", linewidth=1.0)
     style.plain_log_ticks(panel.yaxis)
     magic = linear_theory.magic_steps(found.cell_omega_h.values.min(), found.cell_omega_h.values.max(), _TICKED)
     right = panel.secondary_yaxis("right")
     right.set_yticks(list(magic.values()), [str(n) if numbered and n <= _NUMBERED else "" for n in magic])
     right.minorticks_off()
-    right.tick_params(labelsize=7.5)
+    right.tick_params(labelsize=style.SMALL)
     if numbered:
-        right.set_ylabel("magic steps, by n [1]", fontsize=7.5)
+        right.set_ylabel("magic steps, by n [1]", fontsize=style.SMALL)
 
 
 def pass_fraction(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
@@ -199,10 +206,10 @@ def pass_fraction(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
         for found in sweeps.values()
         for law, stiffness in np.unique([found.cell_contact, found.cell_stiffness], axis=1).T
     ]
-    figure = style.new_figure(title, width=10.5, height=1.3 + 2.6 * len(scans))
+    figure = style.new_figure(title, style.PAGE, 1.2 + 1.8 * len(scans))
     panels = figure.subplots(len(scans), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     looks = {
-        name: {"color": look["color"], "linewidth": _WIDTHS[min(k, len(_WIDTHS) - 1)]}
+        name: {"color": look["color"], "linestyle": look["line"], "linewidth": _WIDTHS[min(k, len(_WIDTHS) - 1)]}
         for k, (name, look) in enumerate(style.CRITERION_LOOKS.items())
     }
     drawn: dict[tuple[str, float], None] = {}
@@ -230,7 +237,7 @@ def pass_fraction(sweeps: Mapping[str, xr.Dataset], title: str) -> Figure:
     if any(_of_the_paper(scan) for scan in scans):
         paper = ", ".join(f"{steps:,} ({where})" for where, steps in PAPER_STEPS.items())
         handles.append(style.mark(f"the paper's steps: {paper}", **_PAPER_LOOK))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -245,12 +252,12 @@ def _known_steps(panel: Any, scan: xr.Dataset) -> None:
         marks.append((limit, "ωh = 2", style.THEORY))
     for place, name, look in marks:
         panel.axvline(place, zorder=2, **look)
-        style.write_beside(panel, name, (place, 1.17), (3, 0), va="top", fontsize=7.5, color=style.INK)
+        style.write_beside(panel, name, (place, 1.17), (3, 0), va="top", fontsize=style.SMALL, color=style.INK)
     taken = [count for count in PAPER_STEPS.values() if _of_the_paper(scan) and steps[0] <= count <= steps[-1]]
     panel.plot(taken, [-0.05] * len(taken), linestyle="none", **_PAPER_LOOK)
     shown = [value for value in _OMEGA_H if steps[0] <= product / value <= steps[-1]]
     top = style.top_axis(panel, [product / value for value in shown], [f"{value:g}" for value in shown])
-    top.set_xlabel(style.OMEGA_H, fontsize=7.5)
+    top.set_xlabel(style.OMEGA_H, fontsize=style.SMALL)
 
 
 def _of_the_paper(scan: xr.Dataset) -> bool:

@@ -20,9 +20,6 @@ from stiffdice.report.number_format import readable
 from stiffdice.report.tables.tosses import VARIANT_WORDS
 from stiffdice.scene.cube import LINKS
 
-# From the softest ground to the hardest, or as many of these as there are.
-_CONTACTS = (style.GREEN, style.BLUE, style.PURPLE, style.ORANGE, style.VERMILION, style.QUIET)
-
 # By criterion: the errors against reality, those of the steps alone, what they are, factor to the unit that is shown.
 _CRITERIA = {
     "path": ("path", "path_numerical", "path error [% of the side]", 100.0),
@@ -34,19 +31,19 @@ _ENDS = {"path": (1e-2, 3e3), "orientation": (1e-2, 300.0), "face": (0.3, 150.0)
 
 _SOURCES = {
     "sample": ("first sample", style.VERMILION, "o"),
-    "flight": ("fit to the flight", style.BLUE, "s"),
+    "flight": ("fit to the flight", style.SKY, "s"),
 }
 _VARIANTS: dict[str, dict[str, Any]] = {
     "full": {"color": style.INK, "linewidth": 2.2, "zorder": 4},
-    "flight_launch": {"color": style.BLUE, "linewidth": 1.8, "zorder": 3},
+    "flight_launch": {"color": style.SKY, "linewidth": 1.8, "zorder": 3},
     "lengths_as_stored": {"color": style.QUIET, "linestyle": ":"},
-    "solid_inertia": {"color": style.GREEN},
-    "corner_inertia": {"color": style.GREEN, "linestyle": "--"},
-    "no_friction": {"color": style.ORANGE},
-    "ungated": {"color": style.PURPLE},
-    "no_rotation": {"color": style.VERMILION},
-    "no_ground": {"color": style.VERMILION, "linestyle": "--"},
-    "stays": {"color": style.QUIET, "linestyle": "--"},
+    "solid_inertia": {"color": style.GREEN, "marker": "s"},
+    "corner_inertia": {"color": style.GREEN, "linestyle": "--", "marker": "P"},
+    "no_friction": {"color": style.PURPLE, "marker": "v"},
+    "ungated": {"color": style.LAW_COLORS["ungated"], "linestyle": "-.", "marker": "o"},
+    "no_rotation": {"color": style.VERMILION, "marker": "D"},
+    "no_ground": {"color": style.VERMILION, "linestyle": "--", "marker": "^"},
+    "stays": {"color": style.QUIET, "linestyle": "--", "marker": "x"},
 }
 _SLOWER = 4  # the animation, than the toss
 
@@ -54,16 +51,17 @@ _SLOWER = 4  # the animation, than the toss
 def steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return error against reality over steps a second, a panel for each criterion, a curve for each contact time."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, height=9.0)
+    figure = style.new_figure(title, height=6.4)
     panels = figure.subplots(3, 1, sharex=True)
     times = found.contact_time.values
+    colours = [look["color"] for look in style.ordered(len(times))]
     for panel, (criterion, (name, numerical, label, factor)) in zip(panels, _CRITERIA.items(), strict=True):
         lowest, highest = _ENDS[criterion]
-        for colour, time in zip(_CONTACTS, times[::-1], strict=False):
+        for colour, time in zip(colours, times[::-1], strict=True):
             here = found.sel(contact_time=time)
             rate = steps_per_second(here)
             curve, own = (factor * here[key].mean("toss").values for key in (name, numerical))
-            panel.plot(rate, curve, color=colour, linewidth=2, zorder=3)
+            panel.plot(rate, curve, color=colour, linewidth=1.6, zorder=3)
             panel.plot(rate, np.maximum(own, lowest / 2), color=colour, linestyle="--", linewidth=1)
             limit = float(here.contact_frequency / here.stability_limit)
             panel.axvline(limit, color=colour, linestyle=":", linewidth=1)
@@ -77,15 +75,15 @@ def steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels[0].set_title("← time steps matter")
     panels[0].set_title("only physics does →", loc="right")
     panels[-1].set_xlabel("time steps a second [1/s]")
-    pairs = zip(_CONTACTS, times[::-1], strict=False)
+    pairs = zip(colours, times[::-1], strict=True)
     handles = [style.line(f"contact time {1e3 * time:g} ms", color=colour) for colour, time in pairs]
     handles += [
         style.line("against reality", color=style.INK, linewidth=2),
         style.line("against the same model without steps", color=style.INK, linestyle="--", linewidth=1),
-        style.mark("5 % off the floor, with its ωh", "o", color=style.INK, markerfacecolor="white"),
+        style.mark("5 % off the floor, with its ωh", "o", color=style.INK, markerfacecolor=style.PAPER),
         style.line("fastest contact unstable, by theory", color=style.INK, linestyle=":", linewidth=1),
     ]
-    panels[0].legend(handles=handles, loc="lower left")
+    style.add_legend(figure, handles)
     about = found.attrs
     style.add_note(
         figure,
@@ -107,15 +105,15 @@ def _mark_left(panel: Any, found: xr.Dataset, criterion: str, factor: float, col
     left, floor = float(found.left[k]), float(found.floor.mean("toss")[k])
     if np.isfinite(left):
         place = float(found.contact_frequency) / left, factor * near_floor(criterion, floor)
-        panel.plot(*place, "o", color=colour, markerfacecolor="white", markersize=6, zorder=5)
-        halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+        panel.plot(*place, "o", color=colour, markerfacecolor=style.PAPER, markersize=4, zorder=5)
+        halo = [patheffects.withStroke(linewidth=2.5, foreground=style.PAPER)]
         style.write_beside(panel, f"{left:.2f}", place, (5, 6), color=colour, path_effects=halo, zorder=6)
 
 
 def over_time(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return path and orientation error over time, a curve for each variant of the model."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, width=8.6, height=6.4)
+    figure = style.new_figure(title, height=5.0)
     panels = figure.subplots(2, 1, sharex=True)
     # As long as a third of the tosses are measured: those that take longer are others.
     long = found.measured_tosses.values >= 0.33 * found.sizes["toss"]
@@ -124,11 +122,11 @@ def over_time(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     for panel, (name, factor, ends) in zip(panels, shown, strict=True):
         for variant, values in zip(meanings_of(found.variant), found[name].values, strict=True):
             label, look = VARIANT_WORDS[variant], _VARIANTS[variant]
-            panel.plot(time, factor * values[long], label=label, **look)
+            panel.plot(time, factor * values[long], label=label, markersize=3, markevery=0.15, **look)
         panel.set(yscale="log", ylim=ends)
     panels[0].set_ylabel("path error [% of the side]")
     panels[1].set(ylabel="orientation error [°]", xlabel="time since the first sample [s]", xlim=(0, time[-1]))
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
+    style.add_legend(figure, panels[0].get_legend_handles_labels()[0])
     about = found.attrs
     style.add_note(
         figure,
@@ -141,13 +139,13 @@ def over_time(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
 def fit(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the loss over restitution and friction, and what is left of the errors by contact time."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, width=9.6, height=5.6)
+    figure = style.new_figure(title, style.PAGE, 4.0)
     halves: Any = figure.subfigures(1, 2, width_ratios=(1.05, 1))
     left, right = halves
     panel: Any = left.subplots()
     middle = float(found.attrs["landscape_contact_time"])
     drawn = panel.contourf(
-        found.friction_tried, found.restitution_tried, found.landscape, levels=20, cmap="viridis_r", extend="both"
+        found.friction_tried, found.restitution_tried, found.landscape, levels=20, cmap=style.LOSS, extend="both"
     )
     left.colorbar(drawn, ax=panel, label="mean loss of the fitted tosses [sides + rad]")
     best = found.isel(source=0).sel(contact_time=middle)
@@ -156,13 +154,15 @@ def fit(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         for name in ("friction", "restitution")
     ]
     at = float(best.friction), float(best.restitution)
-    panel.errorbar(*at, xerr=ends[0], yerr=ends[1], fmt="o", color="white", markeredgecolor=style.INK, ecolor="white")
+    panel.errorbar(
+        *at, xerr=ends[0], yerr=ends[1], fmt="o", color=style.PAPER, markeredgecolor=style.INK, ecolor=style.PAPER
+    )
     text = f"e = {at[1]:.2g}, μ = {at[0]:.2g}"
     style.write_beside(panel, text, at, (8, 8), fontweight="bold")
     panel.set(xlabel="friction coefficient μ [1]", ylabel="restitution e [1]")
     panel.set_title(f"first sample's launches, contact time {1e3 * middle:g} ms")
     panel.grid(visible=False)
-    _floors(right.subplots(3, 1, sharex=True), found)
+    style.add_legend(figure, _floors(right.subplots(3, 1, sharex=True), found), "launches")
     style.add_note(
         figure,
         f"fitted on {int(found.attrs['fitted'])} random tosses, told on the other {found.sizes['toss']}; bars: 95 % by "
@@ -171,7 +171,8 @@ def fit(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     return figure
 
 
-def _floors(panels: Any, found: xr.Dataset) -> None:
+def _floors(panels: Any, found: xr.Dataset) -> list[Any]:
+    """Draw the errors that stay by contact time, and return what a legend shows."""
     times = 1e3 * found.contact_time.values
     shown = (
         ("path", 100.0, "path error\n[% of the side]"),
@@ -191,13 +192,13 @@ def _floors(panels: Any, found: xr.Dataset) -> None:
     panels[2].set_xticks(times, [f"{time:g}" for time in times])
     panels[2].minorticks_off()
     panels[0].set_title("what is left, e and μ fitted at each contact time")
-    panels[0].legend(title="launches", title_fontsize=8)
+    return panels[0].get_legend_handles_labels()[0]
 
 
 def chaos(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return shares of final faces over the size of the launch's error, in units of the tracker's."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, height=4.6)
+    figure = style.new_figure(title, style.PAGE, 3.2)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     sizes = found["size"].values
     curves = (
@@ -217,7 +218,7 @@ def chaos(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         panel.set_title(f"launches: {words}")
     panels[0].set_ylabel("share of tosses [%]")
     handles = [style.line(label, color=style.INK, linestyle=dashes) for _, label, dashes in curves]
-    panels[1].legend(handles=handles, loc="center left")
+    style.add_legend(figure, handles)
     about = found.attrs
     place, turn = 1e3 * about["tracker_position"], np.degrees(about["tracker_orientation"])
     speed, spin = 1e3 * about["tracker_velocity"], about["tracker_angular_velocity"]
@@ -233,7 +234,7 @@ def animation(experiments: Mapping[str, xr.Dataset], title: str) -> Animation:
     """Return one toss beside its simulation, four times slower than it was."""
     (found,) = experiments.values()
     nodes = [found[f"{name}_nodes"].values for name in ("measured", "simulated")]
-    figure = style.new_figure(title, width=6.4, height=3.6)
+    figure = style.new_figure(title, 6.4, 3.6)
     figure.set_layout_engine("none")
     axes: Any = figure.add_axes((-0.12, -0.18, 1.24, 1.3), projection="3d", computed_zorder=False)
     every = np.concatenate(nodes)
@@ -244,7 +245,7 @@ def animation(experiments: Mapping[str, xr.Dataset], title: str) -> Animation:
     axes.view_init(elev=16, azim=_azimuth(found))
     x, y = np.meshgrid([low[0], high[0]], [low[1], high[1]])
     axes.plot_surface(
-        x, y, 0 * x, color="#f3eee4", edgecolor=style.QUIET, linewidth=0.6, shade=False, zorder=0, clip_on=False
+        x, y, 0 * x, color=style.EARTH, edgecolor=style.QUIET, linewidth=0.6, shade=False, zorder=0, clip_on=False
     )
     axes.set_axis_off()
     looks = (("measured", style.INK, 1.8), ("simulated", style.VERMILION, 1.3))

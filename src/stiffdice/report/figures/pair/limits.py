@@ -20,15 +20,15 @@ _EDGES = {
 }
 _LINES: dict[str, tuple[str, dict[str, Any]]] = {
     "limit": ("linear limit of the bounce: ωh = 2 without damping", style.THEORY),
-    "gain": ("no phase gains more than 5 %", {"color": style.GREEN, "linewidth": 1.4}),
-    "bound": ("proven: ωh < 0.436", {"color": style.GREEN, "linestyle": ":", "linewidth": 1.4}),
+    "gain": ("no phase gains more than 5 %", {"color": style.GREEN, "linewidth": 1.1}),
+    "bound": ("proven: ωh < 0.436", {"color": style.GREEN, "linestyle": ":", "linewidth": 1.1}),
 }
 
 
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return a panel for each case."""
     cases = pair_words.cases_of(experiments)
-    figure = style.new_figure(title, width=10.0, height=3.9 * ((len(cases) + 1) // 2))
+    figure = style.new_figure(title, style.PAGE, 0.8 + 2.5 * ((len(cases) + 1) // 2))
     panels = figure.subplots((len(cases) + 1) // 2, 2, sharex=True, sharey=True, squeeze=False)
     for panel, (name, found) in zip(panels.flat, cases.items(), strict=False):
         _draw_case(panel, found)
@@ -40,7 +40,9 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         panel.set_xlabel(style.STIFFNESS)
     for panel in panels[:, 0]:
         panel.set_ylabel("steps [1]")
-    handles = [style.mark(words, look["marker"], color=look["color"], markersize=5) for words, look in _EDGES.values()]
+    handles = [
+        style.mark(words, look["marker"], color=look["color"], markersize=3.5) for words, look in _EDGES.values()
+    ]
     handles += [style.line(words, **look) for words, look in _LINES.values()]
     first = next(iter(experiments.values()))
     told = (
@@ -48,16 +50,16 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         f"{first.attrs['speed']:g} m/s without gravity and damping; of the stack ζ = {first.attrs['zeta']:g}; "
         "grey: a phase fails"
     )
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, title=told, title_fontsize=7.5)
+    style.add_legend(figure, handles, told)
     return figure
 
 
 def _draw_case(panel: Any, found: xr.Dataset) -> None:
     stiffness = found.stiffness.values
     failing = np.where(found.pass_fraction < 1, found.scanned, np.nan)
-    panel.plot(stiffness, failing, linestyle="none", marker="_", color=style.FAINT, markersize=6, zorder=1)
+    panel.plot(stiffness, failing, linestyle="none", marker="_", color=style.FAINT, markersize=4, zorder=1)
     for name, (_, look) in _LINES.items():
         panel.plot(stiffness, found[name], zorder=2, **look)
     for name, (_, look) in _EDGES.items():
-        panel.plot(stiffness, found[name], linestyle="none", markersize=5, zorder=3, **look)
+        panel.plot(stiffness, found[name], linestyle="none", markersize=3.5, zorder=3, **look)
     panel.set(xscale="log", yscale="log")

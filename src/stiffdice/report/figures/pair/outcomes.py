@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -22,9 +21,9 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return a row for each pose: the spin of either cube, and the energy of both; at the largest restitution."""
     (found,) = experiments.values()
     poses = meanings_of(found.pose)
-    figure = style.new_figure(title, width=11.0, height=3.1 * len(poses) + 0.9)
+    figure = style.new_figure(title, style.PAGE, 2.0 * len(poses) + 0.9)
     panels = figure.subplots(len(poses), 3, sharex=True, squeeze=False)
-    colors = mpl.colormaps["viridis"](np.linspace(0.0, 0.9, found.sizes["friction"]))
+    colors = [look["color"] for look in style.ordered(found.sizes["friction"])]
     chosen = found.isel(restitution=int(np.argmax(found.restitution.values)))
     for row, pose in enumerate(poses):
         _draw_pose(panels[row], chosen.isel(pose=row), pair_words.spin_of_units(found), colors)
@@ -34,14 +33,14 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     handles = [style.line(f"μ = {mu:g}", color=color) for mu, color in zip(found.friction.values, colors, strict=True)]
     handles += [
         style.line("one impulse, μ = 0", **style.THEORY),
-        style.mark("they met again", ".", color=style.INK, markersize=5),
-        style.mark("step error above a line's width", "o", color=style.INK, fillstyle="none", markersize=5),
+        style.mark("they met again", ".", color=style.INK, markersize=3.5),
+        style.mark("step error above a line's width", "o", color=style.INK, fillstyle="none", markersize=3.5),
     ]
     told = (
         f"e = {float(chosen.restitution):g}; velocity Verlet, ωh = {found.attrs['omega_h']:g}; "
         f"S = {found.attrs['stiffness']:g} kg/s²; v = {found.attrs['speed']:g} m/s; s: the side"
     )
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, title=told, title_fontsize=7.5)
+    style.add_legend(figure, handles, told)
     return figure
 
 
@@ -51,8 +50,8 @@ def _draw_pose(panels: Any, found: xr.Dataset, scale: float, colors: Any) -> Non
         for k, color in enumerate(colors):
             spin = found.spin.values[k, :, body] / scale
             panels[body].plot(offset, spin, color=color)
-            panels[body].plot(offset[again[k]], spin[again[k]], ".", color=color, markersize=5)
-            panels[body].plot(offset[off[k]], spin[off[k]], "o", color=color, fillstyle="none", markersize=5)
+            panels[body].plot(offset[again[k]], spin[again[k]], ".", color=color, markersize=3.5)
+            panels[body].plot(offset[off[k]], spin[off[k]], "o", color=color, fillstyle="none", markersize=3.5)
         panels[body].plot(offset, found.impulse_spin.values[:, body] / scale, **style.THEORY)
         panels[body].set_ylabel(f"spin of the {words} cube [v/s]")
     for k, color in enumerate(colors):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,8 @@ from matplotlib.figure import Figure
 from stiffdice.report.figures import style
 from stiffdice.report.tables.pair_peers import NAMES, POSE_NAMES, asked, at, changes
 
-_LOOKS: dict[str, dict[str, Any]] = {
-    "symplectic_euler": {"color": style.BLUE, "marker": "o", "markersize": 6},
-    "mujoco": {"color": style.ORANGE, "marker": "d", "markersize": 3},
-    "mujoco_default": {"color": style.VERMILION, "marker": "s", "markersize": 4},
-    "drake": {"color": style.GREEN, "marker": "p", "markersize": 5},
-    "drake_default": {"color": style.PURPLE, "marker": "v", "markersize": 5},
-}
+_SIZES = {"symplectic_euler": 4.5, "mujoco": 2.5, "mujoco_default": 5, "drake": 3.5, "drake_default": 5}
+_LOOKS = {way: {**style.METHOD_LOOKS[way], "markersize": size} for way, size in _SIZES.items()}
 _HIGHEST = 1e3  # energies above are drawn there
 _POSES = [{"marker": "o"}, {"marker": "s"}, {"marker": "D"}]
 
@@ -26,7 +21,7 @@ _POSES = [{"marker": "o"}, {"marker": "s"}, {"marker": "D"}]
 def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     """Return the energy after a throw, the speed out of depth, what a small turn changes, and the depths found."""
     (found,) = experiments.values()
-    figure = style.new_figure(title, width=11.0, height=8.6)
+    figure = style.new_figure(title, style.PAGE, 6.4)
     (energy, speed), (turn, depth) = figure.subplots(2, 2)
     _energies(energy, found)
     _speeds(speed, found)
@@ -35,7 +30,8 @@ def draw(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     handles = [
         style.line(NAMES[way], **_LOOKS[way]) for way in asked(found) if at(found, way).energy_ratio.notnull().any()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5)
+    handles += [style.mark(name, color=style.INK, fillstyle="none", markersize=3.5, **look) for name, look in _poses()]
+    style.add_legend(figure, handles)
     return figure
 
 
@@ -45,6 +41,11 @@ def _lines(panel: Any, found: xr.Dataset, x: xr.DataArray, name: str, reduced: t
         values = at(found, way)[name].max(dim=reduced) if reduced else at(found, way)[name]
         if values.notnull().any():
             panel.plot(x, np.minimum(values, _HIGHEST), label=way, **_LOOKS[way])
+
+
+def _poses() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield words and mark of each pose of a cube in another."""
+    return zip(POSE_NAMES.values(), _POSES, strict=True)
 
 
 def _energies(panel: Any, found: xr.Dataset) -> None:
@@ -60,7 +61,9 @@ def _speeds(panel: Any, found: xr.Dataset) -> None:
     panel.plot(found.depth, found.energy_speed, **style.THEORY, zorder=4)
     panel.axvspan(0.5, 1.0, color=style.QUIET, alpha=0.12, linewidth=0)
     style.write_in_corner(panel, 0.04, "dashed: all energy of the springs, √(2U/mᵣ)")
-    panel.text(0.75, 0.25, "ours: verdict deep", transform=panel.get_xaxis_transform(), ha="center", fontsize=8)
+    panel.text(
+        0.75, 0.25, "ours: verdict deep", transform=panel.get_xaxis_transform(), ha="center", fontsize=style.SMALL
+    )
     panel.set(xlim=(0.0, 1.0), ylim=(0.0, 1.15 * float(found.energy_speed.max())))
     panel.set_title("mujoco#3476: a cube put deep in another")
     panel.set(xlabel="depth over the side [1]", ylabel="speed at which they part [m/s]")
@@ -80,15 +83,16 @@ def _turns(panel: Any, found: xr.Dataset) -> None:
 
 def _depths(panel: Any, found: xr.Dataset) -> None:
     ways = [way for way in asked(found) if at(found, way).depth_ratio.notnull().any()]
-    for k, (name, look) in enumerate(zip(POSE_NAMES.values(), _POSES, strict=True)):
+    for k, (name, look) in enumerate(_poses()):
         ratios = [float(at(found, way).depth_ratio[k]) for way in ways]
         places = np.arange(len(ways)) + 0.22 * (k - 1)
-        panel.plot(ratios, places, linestyle="none", color=style.INK, fillstyle="none", label=name, **look)
+        panel.plot(
+            ratios, places, linestyle="none", color=style.INK, fillstyle="none", markersize=3.5, label=name, **look
+        )
     panel.axvline(1.0, **style.THEORY)
     panel.axvline(3**0.5, color=style.QUIET, linestyle=":")
-    panel.text(3**0.5, 0.03, " √3", transform=panel.get_xaxis_transform(), fontsize=8)
+    panel.text(3**0.5, 0.03, " √3", transform=panel.get_xaxis_transform(), fontsize=style.SMALL)
     panel.set_yticks(range(len(ways)), [NAMES[way].replace(", ", ",\n") for way in ways])
     panel.set(xlim=(0.8, 2.6), ylim=(len(ways) - 0.4, -0.6))
-    panel.legend(loc="center right")
     panel.set_title("fcl#545: how deep a cube is found")
     panel.set(xlabel="depth found over the depth [1]")
