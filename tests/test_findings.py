@@ -1,4 +1,4 @@
-"""The numbers that README.md and docs/explanation/method.md state of the paper, measured again."""
+"""The numbers that docs/explanation/paper.md and method.md state of the paper, measured again."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from stiffdice.scene.scene import PRESETS, Scene
 # Of each key: its unit, and what else it may be.
 _KEYS = {
     "cube": "the body: a cube, or a box with a load (config/README.md)",
-    "cube.radius": "[m] centre to corner. Or `side: 16 mm` in its place; a box has `sides: [a, b, c]`",
+    "cube.radius": "[m] centre to corner. Or `side: 16 mm`, with geometry: exact; a box has `sides: [a, b, c]`",
     "cube.mass": "[kg] in total",
     "cube.geometry": "printed: side as in the paper's formula; exact: a true cube, side 2r/√3",
     "cube.inertia": "solid: m s²/6; corners: m s²/2, eight masses at the corners",

@@ -1,0 +1,101 @@
+"""A folder that is like a fresh clone, set up, in which the commands of a page are run one after another."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from tests.documentation.pages import ROOT, Block, lines, without_comment
+
+from stiffdice.cli import main as cli
+
+# A line that needs no shell.
+_PLAIN = re.compile(r"(?:\.venv/bin/)?stiffdice [^|&;<>$*~`(]*")
+
+
+class Ended(NamedTuple):
+    """What a command has left."""
+
+    status: int
+    out: str
+    err: str
+
+
+class Checkout:
+    """A copy of the project with the environment that the tests run in, without network."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.namespace: dict[str, Any] = {}
+        for name in ("workflow", "config", "docs", "requirements", "benchmarks"):
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.png", "*.gif"))
+        for path in ROOT.iterdir():
+            if path.is_file() and not path.name.startswith("."):
+                shutil.copy(path, folder)
+        (folder / "src").symlink_to(ROOT / "src")  # another place would be compiled again
+        (folder / "tests").symlink_to(ROOT / "tests")
+        (folder / "profiles").symlink_to("workflow/profiles")
+        (folder / ".venv").symlink_to(sys.prefix)
+        (folder / "results").mkdir()
+        shutil.copy(ROOT / "results/README.md", folder / "results")
+        self._put_make_on_path(folder / ".bin")
+
+    def _put_make_on_path(self, folder: Path) -> None:
+        """Set-up is done: make passes over it."""
+        folder.mkdir()
+        (folder / "make").write_text(f'#!/bin/sh\nexec {shutil.which("make")} -o install -o install-engines "$@"\n')
+        (folder / "make").chmod(0o755)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """A proxy that is not there, so that what asks the network fails; commands of the project on the path."""
+        path = os.pathsep.join([str(self.folder / ".bin"), f"{sys.prefix}/bin", os.environ["PATH"]])
+        source = os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])
+        away = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
+        return {**os.environ, **away, "PATH": path, "PYTHONPATH": source, "MPLBACKEND": "agg"}
+
+    def shell(self, script: str) -> Ended:
+        """Run a script, which ends with the first command that fails."""
+        done = subprocess.run(
+            ["bash", "-e", "-c", script],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return Ended(done.returncode, done.stdout, done.stderr)
+
+    def here(self, call: Callable[..., Any], *given: object) -> Ended:
+        """Call what runs in this process, so that it need not import all that it needs again."""
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.chdir(self.folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                status = call(*given)
+            except SystemExit as end:
+                status = end.code
+        return Ended(int(status or 0), out.getvalue(), err.getvalue())
+
+    def run(self, block: Block, script: str) -> Ended:
+        """Run a step of a block, without the lines that are not run; Python after what the page has run before."""
+        if block.language == "python":
+            return self.here(exec, script, self.namespace)
+        script = "".join(
+            line for line in script.splitlines(keepends=True) if not line.startswith(block.left_out or "\0")
+        )
+        plain = [without_comment(line) for line in lines(script)]
+        if "<<" in script or not all(_PLAIN.fullmatch(line) for line in plain):
+            return self.shell(script)
+        ends = [self.here(cli.main, shlex.split(line)[1:]) for line in plain]
+        assert all(end.status == 0 for end in ends[:-1]), f"{block}: {ends}"
+        return Ended(ends[-1].status, "".join(end.out for end in ends), "".join(end.err for end in ends))
