@@ -7,12 +7,14 @@ import gc
 import importlib
 import inspect
 import os
+import uuid
 from collections.abc import Callable
 from functools import cache
 from typing import Any, cast
 
 import numba
 from numba.core import (
+    bytecode,
     codegen,
     compiler,
     compiler_machinery,
@@ -37,6 +39,20 @@ vars(linalg)["ensure_blas"] = vars(_arraymath)["ensure_blas"] = _ensure_blas
 # In the environment for child processes and for numba to find when it reads it again.
 os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
 setattr(numba.config, "CACHE_DIR", os.environ["NUMBA_CACHE_DIR"])  # noqa: B010 (mypy knows no such attribute)
+
+
+class _UniqueNumbers:
+    """Numbers by which numba tells functions of one name apart, different in every process.
+
+    Numba counts from one in each. Two closures that two processes compiled may then have one symbol. Where kernels with
+    both are loaded from disk, calls of one reach the other: a criterion takes another's place.
+    """
+
+    def __next__(self) -> int:
+        return uuid.uuid4().int
+
+
+vars(bytecode)["FunctionIdentity"]._unique_ids = _UniqueNumbers()
 
 # Of these numba has no types.
 _Library: Any = codegen.JITCodeLibrary
