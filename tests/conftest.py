@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import shutil
 import signal
 from pathlib import Path
 from typing import NamedTuple
@@ -31,6 +33,20 @@ def pytest_collection_modifyitems(items):
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = Path(__file__).parent / "reference"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """A browser for all tests of a worker: there is one loop of events in a process."""
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on the PATH (apt-get install chromium): pages are not tried in a browser")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as engine:
+        # Chromium's own sandbox does not start for root, as tests run in containers.
+        browser = engine.chromium.launch(executable_path=CHROMIUM, chromium_sandbox=os.geteuid() != 0)
+        yield browser
+        browser.close()
 
 
 class Reference(NamedTuple):

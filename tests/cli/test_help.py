@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -94,7 +95,7 @@ def test_examples_name_what_is_there_and_options_that_are(command):
     "command", ["run", pytest.param("advise", marks=pytest.mark.broad), "ground", "new", "plot", "completion"]
 )
 def test_examples_run(command, tmp_path):
-    (tmp_path / "config").symlink_to(ROOT / "config")
+    shutil.copytree(ROOT / "config", tmp_path / "config")
     for words in examples(command):
         done = run_module("stiffdice.cli", *words[1:], cwd=tmp_path)
         assert done.returncode == 0, f"{shlex.join(words)}: {done.stderr}{done.stdout}"

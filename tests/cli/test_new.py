@@ -16,13 +16,11 @@ from stiffdice.study import config
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(path for path in (ROOT / "config/scenes").glob("*.yaml") if "cubes" not in path.read_text())
-SCHEMA = "workflow/schemas/study.schema.yaml"
 
 
 @pytest.fixture
 def project(tmp_path):
     """The folder of the tests as a project's."""
-    shutil.copytree(ROOT / "workflow/schemas", tmp_path / "workflow/schemas")
     shutil.copytree(ROOT / "config/scenes", tmp_path / "config/scenes")
     return tmp_path
 
@@ -51,7 +49,7 @@ def test_a_study_of_any_scene_is_one(stiffdice, project, path):
     status, out, _, _ = stiffdice("new", "mine", "--from", f"config/scenes/{path.name}")
     assert status == 0
     assert out.splitlines()[:2] == ["config/scenes/mine.yaml", "config/mine.yaml"]
-    study = config.load("config/mine.yaml", SCHEMA)
+    study = config.load("config/mine.yaml")
     assert list(study.figures) == ["position", "energy", "frontier"]
     assert study.left_out == ()
     assert load("config/scenes/mine.yaml") == load(path)

@@ -47,11 +47,13 @@ class Checkout:
         (folder / ".venv").symlink_to(sys.prefix)
         (folder / "results").mkdir()
         shutil.copy(ROOT / "results/README.md", folder / "results")
-        self._put_make_on_path(folder / ".bin")
+        self._put_on_path(folder / ".bin")
 
-    def _put_make_on_path(self, folder: Path) -> None:
-        """Set-up is done: make passes over it."""
+    def _put_on_path(self, folder: Path) -> None:
+        """Set-up is done: make passes over it, and nothing is installed into the environment of these tests."""
         folder.mkdir()
+        (folder / "pip").write_text("#!/bin/sh\necho 'no pip in the tests of the documentation' >&2\nexit 1\n")
+        (folder / "pip").chmod(0o755)
         (folder / "make").write_text(f'#!/bin/sh\nexec {shutil.which("make")} -o install -o install-engines "$@"\n')
         (folder / "make").chmod(0o755)
 

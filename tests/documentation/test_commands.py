@@ -31,7 +31,7 @@ COMMAND = r"^(?:\$ |(?:\.venv/bin/)?(?:stiffdice|snakemake|python|make) [\w-])"
 def held_to_what_there_is(words: list[str]) -> None:
     """Fail for an option, a target, a variable or a file that is not there."""
     program, *rest = words
-    if program == "stiffdice":
+    if program == "stiffdice" and "--version" not in rest:
         cli._parser().parse_args(rest)
     elif program == "make":
         for word in rest:

@@ -29,6 +29,7 @@ def test_a_sensible_run_leaves_no_doubt():
         ("launch", {"angular_momentum": {"seed": 7}}, 10_000, "turns the cube by 628 rad in a step"),
         ("launch", {"position": [0, 0, -5]}, 10_000, "starts in the ground, its lowest node 5.01 m deep"),
         ("launch", {"position": [0, 0, 0.005]}, 10_000, "starts in the ground, its lowest node 0.00193 m deep"),
+        ("cube", {"geometry": "printed"}, 10_000, "puts the corners 0.000176 m from the centre"),
         ("cube", {"radius": 12}, 10_000, "density of 1.9e-06 kg/m³"),
         ("ground", {"stiffness": 1e6}, 10_000, "symplectic_euler needs 18,000 or more"),
     ],

@@ -13,7 +13,6 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
-from playwright.sync_api import sync_playwright
 from tests.archive import packing
 from tests.workflow.test_workflow import TINY, Project
 
@@ -133,32 +132,30 @@ def chapters(tmp_path_factory):
 
 
 @pytest.mark.long
-def test_the_report_tells_its_chapters_in_order_with_captions_and_figures_and_asks_no_network(chapters):
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page()
-        errors, requests = [], []
-        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("request", lambda request: requests.append(request.url))
-        page.goto(chapters.as_uri())
-        page.wait_for_selector("nav ul a")
-        named = [text.strip() for text in page.locator("nav ul a").all_inner_texts()]
-        assert [text for text in named if text[:1].isdigit()] == ["1 Paper", "2 Stability", "7 Other studies"]
-        page.get_by_text("2 Stability").click()
-        see, about = page.locator("table tbody a").all()[:2]
-        about.click()
-        page.wait_for_selector("text=Asked in")
-        shown = page.inner_text("body")
-        for words in (
-            "Where (stability).",
-            "Asked in config/stability.yaml",
-            "results/stability/runs/stiff.as_listed.h5",
-        ):
-            assert words in shown
-        see.click()
-        page.wait_for_function(LOADED)  # beside Snakemake's logo, which is smaller
-        page.screenshot(path=chapters.with_name("report.png"))
-        browser.close()
+def test_the_report_tells_its_chapters_in_order_with_captions_and_figures_and_asks_no_network(chapters, chromium):
+    page = chromium.new_page()
+    errors, requests = [], []
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(chapters.as_uri())
+    page.wait_for_selector("nav ul a")
+    named = [text.strip() for text in page.locator("nav ul a").all_inner_texts()]
+    assert [text for text in named if text[:1].isdigit()] == ["1 Paper", "2 Stability", "7 Other studies"]
+    page.get_by_text("2 Stability").click()
+    see, about = page.locator("table tbody a").all()[:2]
+    about.click()
+    page.wait_for_selector("text=Asked in")
+    shown = page.inner_text("body")
+    for words in (
+        "Where (stability).",
+        "Asked in config/stability.yaml",
+        "results/stability/runs/stiff.as_listed.h5",
+    ):
+        assert words in shown
+    see.click()
+    page.wait_for_function(LOADED)  # beside Snakemake's logo, which is smaller
+    page.screenshot(path=chapters.with_name("report.png"))
+    page.close()
     assert not errors
     assert {url.partition(":")[0] for url in requests} <= {"file", "data", "blob"}

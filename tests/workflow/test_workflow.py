@@ -224,7 +224,7 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
 
 @pytest.mark.long
 def test_a_changed_style_redraws_only(finished, edited):
-    edited("src/stiffdice/report/figures/style.py", lambda text: text.replace('"font.size": 9', '"font.size": 10'))
+    edited("src/stiffdice/report/figures/style.py", lambda text: text.replace('"font.size": 7', '"font.size": 8'))
     assert finished.jobs_due() == {"figure": 4}
 
 

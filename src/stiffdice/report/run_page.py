@@ -22,6 +22,9 @@ from stiffdice.simulation.run import Run
 # Densities [kg/m³] beyond which a cube is rather a slip in a unit: below hydrogen's, above osmium's several times.
 _DENSITIES = 0.08, 1e5
 
+# The printed formula for the side puts the corners of the paper's cube at 0.9 of its radius, of smaller cubes nearer.
+_FAR = 1.5
+
 
 def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
     """Return what speaks against a run before it is made, a line each.
@@ -33,6 +36,12 @@ def doubts(scene: Scene, model: str, scheme: str, steps: int) -> list[str]:
     if not _DENSITIES[0] <= density <= _DENSITIES[1]:
         size = f"{scene.cube.side:g} m of side, {scene.cube.mass:g} kg"
         said.append(f"the cube has a density of {density:.2g} kg/m³ ({size}); the units are m and kg")
+    corner = scene.cube.side * math.sqrt(3) / 2
+    if scene.cube.radius > _FAR * corner:
+        said.append(
+            f"cube.geometry = printed: of a cube of radius {scene.cube.radius:.3g} m it puts the corners "
+            f"{corner:.3g} m from the centre; exact puts them at the radius"
+        )
     start = start_of(scene, model)[0]
     heights = along(start["position"] + start["node_offset"], scene.ground.normal)
     depth = -float(heights.min())

@@ -40,7 +40,7 @@ def test_words_that_are_offered_are_those_that_are_allowed():
     words = completion._words()
     assert words["PURPOSE"] == list(advise.PURPOSES)
     assert words["ENGINE"] == list(engine_parameters.ENGINES)
-    assert words["THROW"] == [table.throw for table in response_table.load(ROOT / "config/dice/response.yaml")]
+    assert words["THROW"] == [table.throw for table in response_table.load(response_table.SHIPPED)]
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def place(tmp_path):
         (["run", "x.yaml", "--steps", ""], set()),
         (["completion", ""], set(completion.SHELLS)),
     ],
-    ids=" ".join,
+    ids=lambda given: " ".join(sorted(given) if isinstance(given, set) else given),
 )
 def test_bash_offers(scripts, place, typed, offered):
     words = [ASK, "bash", str(scripts / "bash"), str(place), "stiffdice", *typed]

@@ -306,19 +306,26 @@ def test_the_exact_path_that_is_drawn_is_the_one_of_the_scheme_event(shown):
     )
 
 
+def shown_rows(page, part: str) -> list[str]:
+    """Return the rows of a table that has just been unfolded: it is filled then."""
+    rows = page.locator(f"[data-part={part}] tbody tr")
+    rows.first.wait_for()
+    return rows.all_inner_texts()
+
+
 def test_tables_say_what_the_map_shows(shown, published):
     page, sweep = shown.page, shown.sweeps["sliding"]
     page.check("[name=law][value=gated]")
     page.check("[name=criterion][value=energy]")
     frontier = open_results(published.parent / stored_sweeps.PLACE / "sliding" / "frontier.h5")
     page.click("text=Edges as a table")
-    rows = page.locator("[data-part=edges] tbody tr").all_inner_texts()
+    rows = shown_rows(page, "edges")
     edges = frontier.sel(contact="gated", criterion="energy")
     for row, limit, first, last in zip(rows, edges.limit, edges.first_pass, edges.last_fail, strict=True):
         assert [round(float(value)) for value in (limit, first, last)] == numbers(row)[1:]
     choose(page, sweep, cells_of(sweep, "gated")[0])
     page.click("text=Cells of this stiffness as a table")
-    rows = page.locator("[data-part=cells] tbody tr").all_inner_texts()
+    rows = shown_rows(page, "cells")
     of_column = (sweep.contact == "gated") & (sweep.stiffness == sweep.stiffness[cells_of(sweep, "gated")[0]])
     assert [numbers(row)[0] for row in rows] == sweep.steps.values[of_column].tolist()
 

@@ -117,5 +117,5 @@ def test_the_page_says_what_was_found():
     assert f"{summary.fit.friction:.3f}" in text
     data = json.loads(toss_page.as_json("few.h5", summary))
     assert data["friction"]["best"] == summary.fit.friction
-    assert data["told"]["sample"]["path"]["mean"] == pytest.approx(summary.told["sample"].path.mean())
+    assert data["told"]["sample"]["path_sides"]["mean"] == pytest.approx(summary.told["sample"].path.mean())
     assert len(told) >= 5

@@ -36,7 +36,7 @@ def test_every_criterion_says_all_that_is_asked_of_it():
         assert isinstance(part.FAILURE, Verdict)
         assert np.isfinite(part.BASE + part.TOLERANCE)
         assert style.criterion_words(name, part.TOLERANCE)
-        assert set(style.CRITERION_LOOKS[name]) == {"color", "first", "last"}
+        assert set(style.CRITERION_LOOKS[name]) == {"color", "line", "first", "last"}
     assert len({tuple(look.values()) for look in style.CRITERION_LOOKS.values()}) == len(CRITERIA)
 
 
