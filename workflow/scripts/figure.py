@@ -13,7 +13,7 @@ def make(job: Job, say: Say) -> None:
     from stiffdice.study.job_log import digest_of
 
     planned, data = job.plan(), opened(job.input.items(), say)
-    made_from = {"study": job.wildcards["study"], "figure": job.wildcards["figure"], "asked": job.asked}
+    made_from = {"study": job.wildcards["study"], "figure": job.wildcards["figure"]}
     made_from |= {f"file {name}": digest_of(Path(path)) for name, path in job.input.items()}
     figures.draw(planned.draw, data, planned.title, job.dpi, job.output, made_from)
     say(f"{planned.draw} drawn")
