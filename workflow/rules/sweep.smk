@@ -85,8 +85,8 @@ rule frontier:
         table=report(
             "results/{study}/sweeps/{sweep}/frontier.csv",
             caption="../report/frontier.rst",
-            category="{study}",
-            labels={"what": "{sweep}: the numbers behind the frontier"},
+            category=chapter,
+            labels={"study": "{study}", "what": "{sweep}: the numbers behind the frontier"},
         ),
     log:
         "results/{study}/logs/frontier/{sweep}.log",
