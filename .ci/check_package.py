@@ -55,7 +55,7 @@ COMMANDS = (
     ("status", 2, "config/: No such folder; call this in the project's folder"),
     ("archive quick", 2, "config/: No such folder; call this in the project's folder"),
     ("rebuild quick.zip", 2, "quick.zip: No such file"),
-    ("tosses --data tosses.h5", 2, "tosses.h5: No such file"),
+    ("tosses tosses.h5", 2, "tosses.h5: No such file"),
     ("check ball.xml", 2, "ball.xml: No such file"),
 )
 
