@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import jsonschema
+import pytest
 import yaml
 
 import stiffdice
@@ -105,3 +108,19 @@ def test_the_configuration_that_is_deployed_names_a_study_and_is_explained():
     top = (ROOT / "config/README.md").read_text().partition("## Scene\n")[0]
     words = ("config/config.yml", f"config/{study}.yaml", "pip install", "snakemake --cores")
     assert [word for word in words if word not in top] == []
+
+
+@pytest.mark.long
+def test_the_snakefile_at_the_top_is_the_workflows():
+    asked = [[], ["--snakefile", "workflow/Snakefile"]]
+    rules = [
+        subprocess.run(
+            [sys.executable, "-m", "snakemake", "--list-rules", *more],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for more in asked
+    ]
+    assert rules[0] == rules[1] != ""
