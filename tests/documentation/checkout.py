@@ -63,7 +63,9 @@ class Checkout:
         path = os.pathsep.join([str(self.folder / ".bin"), f"{sys.prefix}/bin", os.environ["PATH"]])
         source = os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])
         away = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
-        return {**os.environ, **away, "PATH": path, "PYTHONPATH": source, "MPLBACKEND": "agg"}
+        own = {**os.environ, **away, "PATH": path, "PYTHONPATH": source, "MPLBACKEND": "agg"}
+        # A make that is started by the one that runs the tests would say so.
+        return {name: value for name, value in own.items() if name not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
 
     def shell(self, script: str) -> Ended:
         """Run a script, which ends with the first command that fails."""
