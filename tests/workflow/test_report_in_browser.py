@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -14,11 +13,11 @@ from types import SimpleNamespace
 import pytest
 import yaml
 from tests.archive import packing
+from tests.conftest import CHROMIUM
 from tests.workflow.test_workflow import TINY, Project
 
 from stiffdice.archive.pack import pack
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [
     pytest.mark.workflow,
     pytest.mark.skipif(CHROMIUM is None, reason="needs chromium, which is not installed"),
