@@ -62,6 +62,7 @@ def test_the_map_leads_to_every_part(opened):
     tab = opened("docs/index.html")
     for part in ("tutorial", "how-to", "explanation", "reference"):
         tab.locator(f"article a[href='{part}/index.html']").first.click()
+        tab.wait_for_url(f"**/docs/{part}/index.html")
         assert tab.locator("article h1").count() == 1
         tab.go_back()
 
