@@ -50,8 +50,8 @@ def elastic(physics: Physics, state: Any) -> float:
     height, n, energy = height_of(physics, state), normal_of(physics), 0.0
     for k in range(len(state.node_offset)):
         node = row(state.node_offset, k)
-        depth = -(height + n.x * node.x + n.y * node.y + n.z * node.z)
-        energy += 0.5 * physics.stiffness * max(0.0, depth) ** 2
+        depth = max(0.0, -(height + n.x * node.x + n.y * node.y + n.z * node.z))
+        energy += 0.5 * physics.stiffness * (depth * depth)
     return energy
 
 

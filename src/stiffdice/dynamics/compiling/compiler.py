@@ -15,7 +15,6 @@ from typing import Any, cast
 import numba
 from numba.core import (
     bytecode,
-    codegen,
     compiler,
     compiler_machinery,
     dispatcher,
@@ -24,12 +23,14 @@ from numba.core import (
     typed_passes,
     types,
     typing,
+    untyped_passes,
 )
 from numba.np import linalg
 
+from stiffdice.dynamics.compiling import call_types
 from stiffdice.dynamics.compiling.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder, only_stored
 from stiffdice.dynamics.compiling.kernel_files import KernelCache
-from stiffdice.dynamics.compiling.separate_kernels import Call, KernelLibrary
+from stiffdice.dynamics.compiling.separate_kernels import Call, KernelLibrary, Library
 
 # Numba imports SciPy to see whether it can multiply matrices, which our kernels do not; it looks again when one does.
 _ensure_blas, vars(linalg)["ensure_blas"] = vars(linalg)["ensure_blas"], lambda: None
@@ -53,9 +54,9 @@ class _UniqueNumbers:
 
 
 vars(bytecode)["FunctionIdentity"]._unique_ids = _UniqueNumbers()
+call_types.remember()
 
 # Of these numba has no types.
-_Library: Any = codegen.JITCodeLibrary
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = compiler.Compiler
 _Dispatcher: Any = registry.CPUDispatcher
@@ -88,12 +89,14 @@ class _Kernel(_Dispatcher):  # type: ignore[misc]
                 self._compiled(sig)
 
     def _compiled(self, sig: Any) -> Any:
-        """Compile, or load; garbage is left, as most of what that makes stays."""
+        """Compile, or load; what that makes is not looked through for garbage, as most of it stays."""
         enabled = gc.isenabled()
         gc.disable()
         try:
             return super().compile(sig)
         finally:
+            gc.freeze()
+            gc.unfreeze()  # all that there is counts as old now
             if enabled:
                 gc.enable()
 
@@ -145,11 +148,19 @@ class _Separate(_Kernel):
         return Call.of(self, arguments, symbol)
 
 
+# Passes of numba that do nothing for code like ours: without array expressions, closures, comprehensions and `with`.
+_IDLE = {
+    typed_passes.NopythonRewrites,
+    typed_passes.NoPythonSupportedFeatureValidation,
+    untyped_passes.InlineClosureLikes,
+    untyped_passes.WithLifting,
+}
+
 # Functions of a part, at most, that is optimised: one that holds more is far from any inner loop.
 _MANY = 40
 
 
-class _PartLibrary(_Library):  # type: ignore[misc]
+class _PartLibrary(Library):
     """LLVM code of a part: turned into machine code with the kernel that takes it in, not before.
 
     It is optimised before, too: without that kernels compile in a tenth less time, and are slower by as much.
@@ -190,7 +201,9 @@ class _KernelCompiler(_Compiler):  # type: ignore[misc]
     def define_pipelines(self) -> list[Any]:
         (pipeline,) = super().define_pipelines()
         pipeline.passes = [
-            (self.lowering if made is _Lowering else made, description) for made, description in pipeline.passes
+            (self.lowering if made is _Lowering else made, description)
+            for made, description in pipeline.passes
+            if made not in _IDLE
         ]
         pipeline.finalize()
         return [pipeline]

@@ -85,7 +85,18 @@ _CALLS: dict[str, Call] = {}
 _NOWHERE = 1 << 12
 
 
-class KernelLibrary(_Library):  # type: ignore[misc]
+class Library(_Library):  # type: ignore[misc]
+    """LLVM code. Numba would begin to optimise what a module only declares, too, many more functions than it has."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
+
+
+class KernelLibrary(Library):
     """LLVM code of a kernel."""
 
     def calls(self) -> list[Call]:

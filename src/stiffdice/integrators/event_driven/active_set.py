@@ -285,7 +285,8 @@ def give(turning: bool, physics: Physics, nodes: Any, motion: Any, state: Any) -
 @njit
 def normalise(motion: Any) -> None:
     """Give the quaternion the norm one."""
-    norm = math.sqrt(motion[9] ** 2 + motion[10] ** 2 + motion[11] ** 2 + motion[12] ** 2)
+    w, x, y, z = motion[9], motion[10], motion[11], motion[12]
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
     for part in range(9, 13):
         motion[part] /= norm
 
