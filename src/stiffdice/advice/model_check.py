@@ -112,7 +112,7 @@ class Check:
         return not any(contact.verdicts for contact in self.contacts)
 
 
-def check(path: Path, tell: Callable[[str], None] = lambda _: None) -> Check:
+def check(path: Path, tell: Callable[..., None] = lambda *_: None) -> Check:
     """Return what a model's contacts do; raises InputError where it cannot be read, or nothing in it can fall."""
     model = load(path)
     # It imports MuJoCo, which `load` has found.
@@ -132,7 +132,7 @@ def check_meetings(
     model: Model,
     everyone: Sequence[Meeting],
     ladder: tuple[float, ...],
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[..., None] = lambda *_: None,
     *,
     stop: bool = False,
 ) -> Check:
@@ -142,8 +142,8 @@ def check_meetings(
     found: dict[object, Contact] = {}
     missed: list[tuple[str, str]] = []
     with silence():
-        for meeting in everyone:
-            tell(f"{meeting.names[0]} on {meeting.names[1]}")
+        for number, meeting in enumerate(everyone):
+            tell(f"{meeting.names[0]} on {meeting.names[1]}", number / len(everyone))
             alone = meetings.alone(model.compiled, meeting)
             touch = meetings.touch_of(alone, meeting)
             if touch is None:

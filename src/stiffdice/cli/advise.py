@@ -125,12 +125,12 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.advice import recommend
     from stiffdice.advice.result import check as checked
     from stiffdice.advice.result import run_advised
-    from stiffdice.cli.terminal.progress import notes, progress
+    from stiffdice.cli.terminal.progress import progress, trials
     from stiffdice.report import advice_page
     from stiffdice.simulation.outcome import Verdict
 
     error = recommend.parsed_error(_in_radii(options.error, scene))
-    with notes("advise: trying") as tell:
+    with trials("advise: trying") as tell:
         given = recommend.advise(scene, error, horizon=horizon, scheme=options.scheme, tell=tell)
     check = None
     if options.run and given.best is not None:

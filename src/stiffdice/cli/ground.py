@@ -127,7 +127,7 @@ def _numbers(options: argparse.Namespace, wanted: dict[str, tuple[str, str]], **
 def _told(options: argparse.Namespace, contact: Contact, timestep: float | None) -> tuple[list[str], dict[str, Any]]:
     """Return what to print, as lines and as data."""
     from stiffdice.advice import engine_ladder, engine_parameters, step_limits
-    from stiffdice.cli.terminal.progress import notes
+    from stiffdice.cli.terminal.progress import trials
     from stiffdice.report import ground_page
     from stiffdice.scene import validation
 
@@ -137,12 +137,11 @@ def _told(options: argparse.Namespace, contact: Contact, timestep: float | None)
         engine_parameters.check(contact)
     if engine or not options.quick:
         step_limits.check(contact)
-    with notes("ground: measuring") as tell:
+    with trials("ground: measuring") as tell:
         if not options.quick:
             limits = {}
             for number, scheme in enumerate(step_limits.FIXED):
-                tell(scheme)
-                tell.part(number / len(step_limits.FIXED))
+                tell(scheme, number / len(step_limits.FIXED))
                 limits[scheme] = step_limits.limits(contact, scheme)
             lines += ["", *ground_page.limit_lines(limits, contact)]
             data["longest_steps_s"] = ground_page.limits_as_data(limits)

@@ -75,12 +75,12 @@ def call(options: argparse.Namespace) -> None:
         sources = [] if options.scene is None else [options.scene]
         target = common.picture_target("--animate", options.animate, [".gif"], options.force, *sources)
 
-    from stiffdice.cli.terminal.progress import notes, progress
+    from stiffdice.cli.terminal.progress import notes, progress, trials
     from stiffdice.experiments.dice import throws
 
     steps = throws.default_steps(scene) if options.steps is None else common.whole("--steps", options.steps)
     if count == 1:
-        with notes("throw: throwing"):
+        with trials("throw: throwing"):
             thrown = throws.one(scene, launches, options.scheme, steps)
         _show(options, throws.told_of_one(thrown), thrown.as_mapping())
         if target is not None:

@@ -48,7 +48,7 @@ def call(options: argparse.Namespace) -> int:
         raise InputError("--toss: says which toss to draw, with --animate only")
 
     # These take about a second to import; bad input is told before.
-    from stiffdice.cli.terminal.progress import notes
+    from stiffdice.cli.terminal.progress import notes, trials
     from stiffdice.scene import tosses as files
     from stiffdice.scene.scene import Ground, Scene
 
@@ -64,7 +64,7 @@ def call(options: argparse.Namespace) -> int:
     from stiffdice.report import toss_page
 
     try:
-        with notes("tosses: trying") as tell:
+        with trials("tosses: trying") as tell:
             found = summary_of(stored, scene, contact_time, seed, tell)
     except InputError as error:
         raise error.within(options.data) from None

@@ -62,6 +62,23 @@ def test_what_is_done_in_parts_says_how_long_it_will_take(clock, monkeypatch, ca
     assert "30.0%" not in told, "a line every ten seconds"
 
 
+def test_what_is_tried_next_says_how_long_all_will_take_compiling_included(clock, monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)
+    with progress.trials("advise: trying") as tell:
+        time.sleep(0.2)  # until the note has begun
+        for clock[0], doing, fraction in ((1.0, "a pilot run", 0.0), (11.0, "event", 0.25), (12.0, "rk4", 0.5)):
+            tell(doing, fraction)
+            kernel_cache.TELLING.get()()
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        "advise: trying ...",
+        "advise: trying a pilot run",
+        "advise: trying a pilot run: compiling kernels, once",
+        "advise: trying event: 25.0% done, about 30 s left",
+        "advise: trying rk4: 50.0% done, about 11 s left",
+    ]
+
+
 @pytest.mark.parametrize("said", [progress.notes, progress.progress])
 def test_quiet_leaves_progress_out(clock, monkeypatch, capsys, said):
     monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)

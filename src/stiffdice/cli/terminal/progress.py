@@ -88,19 +88,20 @@ def progress(scheme: str = "") -> Iterator[Callable[[float], None]]:
 
 
 class Notes:
-    """What a block is at; called with what it does next, `part` with the fraction of it that is done."""
+    """What a block is at; called with what it does next, and with the fraction that is done where that is known."""
 
     def __init__(self, what: str) -> None:
         self._what = self._text = what
-        self._line, self._left, self._next_time = _Line(), _Left(), 0.0
+        self._line, self._left, self._next_time, self._has_compiled = _Line(), _Left(), 0.0, False
         self._timer = threading.Timer(QUIET_SECONDS, lambda: self._line.say(f"{self._text} ..."))
         self._timer.daemon = True
 
-    def __call__(self, doing: str) -> None:
-        """Say what is done next."""
+    def __call__(self, doing: str, fraction: float | None = None) -> None:
+        """Say what is done next, and about how long all takes from here on if a fraction of it is done."""
         self._text = f"{self._what} {doing}"
+        left = "" if fraction is None else self._left.after(fraction)
         if self._line.is_shown:
-            self._line.say(self._text)
+            self._line.say(f"{self._text}: {left.strip()}" if left else self._text)
 
     def part(self, fraction: float) -> None:
         """Say how much is done, and about how long the rest takes."""
@@ -108,6 +109,12 @@ class Notes:
         if left and self._line.is_shown and time.monotonic() >= self._next_time:
             self._next_time = time.monotonic() + self._line.interval
             self._line.say(f"{self._text}: {left.strip()}")
+
+    def compiles(self) -> None:
+        """Say that kernels are compiled, the first time."""
+        if not self._has_compiled:
+            self._has_compiled = True
+            self._line.say(f"{self._text}: compiling kernels, once")
 
     def __enter__(self) -> Self:
         self._timer.start()
@@ -121,3 +128,12 @@ class Notes:
 def notes(what: str) -> Notes:
     """Return what says what a block does, once two seconds are over."""
     return Notes(what)
+
+
+@contextlib.contextmanager
+def trials(what: str) -> Iterator[Notes]:
+    """Give what says what a block simulates, that it compiles included."""
+    from stiffdice.dynamics.compiling.kernel_cache import telling
+
+    with Notes(what) as told, telling(told.compiles):
+        yield told

@@ -36,6 +36,7 @@ DATA = "config/measurements/tosses.h5"
 _RESTITUTIONS = 0.04, 0.12, 0.24, 0.45
 _FRICTIONS = 0.06, 0.12, 0.18, 0.27, 0.4
 _SPACING, _ROUNDS = 0.04, 4
+_NEAR = 9  # tried in a round, about
 # Restitutions and frictions over which the loss is told.
 _LANDSCAPE = tuple(np.linspace(0.02, 0.5, 9)), tuple(np.linspace(0.03, 0.39, 13))
 # Steps of the fit: its errors are known to a hundredth.
@@ -78,11 +79,12 @@ def fit(
     physics: Physics,
     *,
     rounds: int = _ROUNDS,
-    tell: Callable[[str], None] = lambda _: None,
+    tell: Callable[[str, float], None] = lambda *_: None,
 ) -> Fit:
     """Return the restitution and friction of least mean loss; the physics gives all else.
 
-    rounds: how often the spacing of what is tried is halved about the best. tell: called with what is tried next.
+    rounds: how often the spacing of what is tried is halved about the best. tell: called with what is tried next,
+    and about what part has been.
     """
     known: dict[tuple[float, float], Array] = {}
 
@@ -95,14 +97,17 @@ def fit(
     def mean(place: tuple[float, float]) -> float:
         return float(known[place].mean())
 
-    tell("a first grid of restitution and friction")
+    def over() -> float:
+        return min(len(known) / (len(_RESTITUTIONS) * len(_FRICTIONS) + _NEAR * rounds), 1.0)
+
     for restitution in _RESTITUTIONS:
+        tell(f"e = {restitution:g}, with any friction", over())
         for friction in _FRICTIONS:
             tried(restitution, friction)
     for halving in range(rounds):
         spacing, best, before = _SPACING / 2**halving, min(known, key=mean), None
         while best != before:
-            tell(f"e = {best[0]:.3g} ± {spacing:.3g}, μ = {best[1]:.3g} ± {spacing:.3g}")
+            tell(f"e = {best[0]:.3g} ± {spacing:.3g}, μ = {best[1]:.3g} ± {spacing:.3g}", over())
             for along in (-1, 0, 1):
                 for across in (-1, 0, 1):
                     tried(best[0] + along * spacing, best[1] + across * spacing)

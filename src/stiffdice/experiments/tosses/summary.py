@@ -32,11 +32,14 @@ class Summary(NamedTuple):
     told: Mapping[str, Told]
 
 
-def summary_of(stored: Tosses, scene: Scene, contact_time: float, seed: int, tell: Callable[[str], None]) -> Summary:
+def summary_of(
+    stored: Tosses, scene: Scene, contact_time: float, seed: int, tell: Callable[[str, float], None]
+) -> Summary:
     """Return what tosses as stored say.
 
     scene: gives gravity and the contact law. contact_time [s]: of a flat landing. seed: of the third. tell: called with
-    what is tried next. Raises InputError for a single toss, and as `calibrated` does.
+    what is tried next and the part of the time that is over.
+    Raises InputError for a single toss, and as `calibrated` does.
     """
     tosses, unit = calibrated(stored, scene.gravity)
     fitted, others = split(len(tosses.counts), seed)
@@ -44,7 +47,14 @@ def summary_of(stored: Tosses, scene: Scene, contact_time: float, seed: int, tel
         raise InputError("row_size: has one toss: allowed are at least two, one to fit and one to tell of")
     mine, rest = tosses.chosen(fitted), tosses.chosen(others)
     physics = Physics(contact_time=contact_time)
-    best = fit(mine, launches_of(mine, SOURCES[0], scene.gravity), scene, physics, tell=tell)
+    best = fit(
+        mine,
+        launches_of(mine, SOURCES[0], scene.gravity),
+        scene,
+        physics,
+        tell=lambda text, part: tell(text, _FIT * part),
+    )
+    tell("the others", _FIT)
     physics = physics._replace(restitution=best.restitution, friction=best.friction)
     found = {
         source: told(rest, launches_of(rest, source, scene.gravity), scene, physics, _OMEGA_H) for source in SOURCES
@@ -52,6 +62,8 @@ def summary_of(stored: Tosses, scene: Scene, contact_time: float, seed: int, tel
     kept = float(np.mean(rest.faces[rest.first] == rest.faces[rest.last]))
     return Summary(tosses, unit, tracker_of(tosses, scene.gravity), len(fitted), best, physics, kept, found)
 
+
+_FIT = 0.85  # of the time
 
 # Errors against reality are known to a hundredth at these steps.
 _OMEGA_H = 0.1
