@@ -155,8 +155,9 @@ def test_the_map_is_the_same_for_any_cube_and_ground(measured):
         "ground": {"stiffness": 3e4, "normal": [1, 0, 2], "damping": 5.0, "friction": 1.0, "contact": "ungated"},
         "launch": {"velocity": [1, 2, 0], "orientation": [0.3, 0.2, 0.1], "angular_momentum": [1, 1, 1]},
     }
-    found = bounce_map.measure(from_mapping(other), count=150, phases=PHASES)
-    np.testing.assert_allclose(found.energy_gain, measured.energy_gain, rtol=0, atol=1e-10)
+    found = bounce_map.measure(from_mapping(other), count=150, phases=10)
+    there = measured.energy_gain.sel(phase=found.phase, method="nearest")
+    np.testing.assert_allclose(found.energy_gain, there, rtol=0, atol=1e-10)
 
 
 def test_everything_is_named_has_units_and_survives_a_file(measured, tmp_path):

@@ -29,7 +29,7 @@ def test_a_toss_that_is_far_off_counts_no_more_than_one_that_is_off():
 def test_the_ground_that_made_the_tosses_is_found():
     """To the last spacing that is tried, 0.005, and beyond it by what steps of another size change."""
     physics = Physics(0.33, 0.225, 0.004)
-    tosses, launches = toss_files.made(20, physics)
+    tosses, launches = toss_files.made(10, physics)
     found = fit.fit(tosses, launches, toss_files.SCENE, Physics(contact_time=0.004))
     assert found.restitution == pytest.approx(physics.restitution, abs=0.02)
     assert found.friction == pytest.approx(physics.friction, abs=0.006)
