@@ -71,13 +71,13 @@ def test_bad_options_are_told(tmp_path):
 
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
-    return str(toss_files.stored(toss_files.some(9), tmp_path_factory.mktemp("tosses") / "few.h5"))
+    return str(toss_files.stored(toss_files.some(6), tmp_path_factory.mktemp("tosses") / "few.h5"))
 
 
 @pytest.mark.long
 def test_measured_are_a_row_for_each_launch_and_contact_time(few):
     found = fit.measure(toss_files.SCENE, data=few, contact_time=(0.005, 0.01))
-    assert dict(found.path.sizes) == {"source": 2, "contact_time": 2, "toss": 6}
+    assert dict(found.path.sizes) == {"source": 2, "contact_time": 2, "toss": 4}
     assert (found.restitution_low <= found.restitution).all()
     assert (found.restitution <= found.restitution_high).all()
     assert float(found.attrs["landscape_contact_time"]) == 0.005
