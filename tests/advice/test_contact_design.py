@@ -44,7 +44,7 @@ def test_a_run_bounces_as_was_asked(restitution):
     launch = dataclasses.replace(scene.launch, position=(0.0, 0.0, scene.cube.side / 2 + height))
     scene = dataclasses.replace(scene, launch=launch)
     steps = 40_000
-    run = simulate(scene, model="vertical", scheme="event", steps=steps, every=1, tolerance=1e-12)
+    run = simulate(scene, model="tumbling", scheme="event", steps=steps, every=1, tolerance=1e-12)
     low = run.trajectory.state["position"][:, 2] - scene.cube.side / 2
     speed = run.trajectory.state["velocity"][:, 2]
     force = scene.cube.mass * np.diff(speed) * steps / scene.duration

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 
 from stiffdice.advice import contact_design, engine_ladder
@@ -31,12 +33,17 @@ def test_mujoco_bounces_as_predicted_at_every_timestep(restitution):
         assert measured == pytest.approx(predicted, rel=1e-5)
 
 
+@pytest.fixture(scope="module")
+def lively():
+    """The ladder of an engine on a contact of restitution 0.9, climbed once."""
+    return cache(lambda engine: climbed(engine, contact(0.9)))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["pybullet", "drake"])
-def test_less_damping_makes_up_for_implicit_steps(engine):
+def test_less_damping_makes_up_for_implicit_steps(engine, lively):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
-    wanted = contact(0.9)
-    ladder = climbed(engine, wanted)
+    wanted, ladder = contact(0.9), lively(engine)
     plain, less = (
         ladder.longest(Column(way, "measured"), "restitution_1", wanted.restitution)
         for way in (engine_ladder.DAMPING, engine_ladder.LESS)
@@ -46,11 +53,9 @@ def test_less_damping_makes_up_for_implicit_steps(engine):
 
 
 @pytest.mark.long
-def test_bullets_own_restitution_is_not_what_a_box_has():
+def test_bullets_own_restitution_is_not_what_a_box_has(lively):
     pytest.importorskip("pybullet")
-    wanted = contact(0.9)
-    ladder = climbed("pybullet", wanted)
-    assert ladder.longest(Column(engine_ladder.RESTITUTION, "measured"), "restitution_5", 0.9) is None
+    assert lively("pybullet").longest(Column(engine_ladder.RESTITUTION, "measured"), "restitution_5", 0.9) is None
 
 
 def test_the_longest_timestep_is_below_the_first_that_fails():

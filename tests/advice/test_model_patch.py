@@ -14,8 +14,9 @@ from stiffdice.simulation.engines.mjcf.model import load
 pytestmark = pytest.mark.long
 
 BALL = 'name="ball" type="sphere" size="0.1"'
-SOFT = 'solref="-100 -5" solimp="0.9 0.9 0.001 0.5 2"'
-PAIR = '<contact><pair geom1="floor" geom2="ball" solref="0.02 3"/></contact>'
+SOFT = 'solref="-2000 -30" solimp="0.9 0.9 0.001 0.5 2"'
+PAIR = '<contact><pair geom1="floor" geom2="ball" solref="0.01 1.2"/></contact>'
+OPTION = 'timestep="0.002"'
 TWO_ON_A_LINE = body('type="sphere" size="0.1"', SOFT, "a") + body('type="sphere" size="0.2"', LINEAR, "b")
 
 
@@ -39,12 +40,12 @@ def patched(text, folder, monkeypatch):
     [
         (ball('solref="-3000000 -20"'), 2),  # a shorter step
         (ball('solref="-1e9 -900"'), 4),  # softer contacts: floor and ball
-        (ball(SOFT), 4),
-        (ball('solref="0.02 3"'), 4),
-        (scene(body(BALL, SOFT + ' priority="1"'), LINEAR), 2),  # the floor's solref has no say
-        (scene(body(BALL), more=PAIR), 2),
-        (scene(TWO_ON_A_LINE, SOFT), 4),
-        (scene("\n".join(body('type="sphere" size="0.1"', SOFT, name) for name in "ab"), SOFT), 6),
+        (ball(SOFT, OPTION), 4),
+        (ball('solref="0.01 1.2"', OPTION), 4),
+        (scene(body(BALL, SOFT + ' priority="1"'), LINEAR, OPTION), 2),  # the floor's solref has no say
+        (scene(body(BALL), option=OPTION, more=PAIR), 2),
+        (scene(TWO_ON_A_LINE, SOFT, OPTION), 4),
+        (scene("\n".join(body('type="sphere" size="0.1"', SOFT, name) for name in "ab"), SOFT, OPTION), 6),
     ],
 )
 def test_the_patch_applied_makes_the_model_pass(text, lines, tmp_path, monkeypatch):

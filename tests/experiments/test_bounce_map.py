@@ -141,7 +141,7 @@ def test_with_gravity_a_magic_step_is_off_by_the_time_that_weight_adds(stiffness
 @pytest.mark.long
 def test_without_gravity_there_is_one_answer():
     scene = from_mapping({"ground": {"stiffness": 1e5}, "gravity": 0, "launch": {"velocity": [0, 0, -4]}})
-    found = bounce_map.measure(scene, count=20, phases=30)
+    found = bounce_map.measure(scene, omega_h=(0.1, 1.98), count=20, phases=30)
     assert float(found.speed) == 4
     np.testing.assert_array_equal(found.largest_with_gravity, np.abs(found.energy_gain).max("phase"))
     np.testing.assert_array_equal(found.gravity_theory, 0)
@@ -155,8 +155,10 @@ def test_the_map_is_the_same_for_any_cube_and_ground(measured):
         "ground": {"stiffness": 3e4, "normal": [1, 0, 2], "damping": 5.0, "friction": 1.0, "contact": "ungated"},
         "launch": {"velocity": [1, 2, 0], "orientation": [0.3, 0.2, 0.1], "angular_momentum": [1, 1, 1]},
     }
-    found = bounce_map.measure(from_mapping(other), count=150, phases=PHASES)
-    np.testing.assert_allclose(found.energy_gain, measured.energy_gain, rtol=0, atol=1e-10)
+    found = bounce_map.measure(from_mapping(other), omega_h=(0.1, 1.9), count=2, phases=10).energy_gain[1:-1]
+    there = measured.energy_gain.sel(omega_h=found.omega_h).sel(phase=found.phase, method="nearest")
+    np.testing.assert_allclose(found, there, rtol=0, atol=1e-10)
+    assert len(found) > 50
 
 
 def test_everything_is_named_has_units_and_survives_a_file(measured, tmp_path):
@@ -199,17 +201,24 @@ def test_what_cannot_be_measured_is_said(scene, arguments, told):
 
 
 @pytest.mark.parametrize(
-    "scene",
+    ("scene", "shortest"),
     [
-        {"ground": {"stiffness": 110}},
-        {"ground": {"stiffness": 1e6}, "launch": {"position": [0, 0, 0.5177], "velocity": [0, 0, -0.3]}},
-        {"ground": {"stiffness": 1e4}, "gravity": 150, "launch": {"position": [0, 0, 1], "velocity": [0, 0, 0]}},
-        {"ground": {"stiffness": 1e6}, "gravity": 399, "launch": {"position": [0, 0, 0.5228], "velocity": [0, 0, 0]}},
+        ({"ground": {"stiffness": 110}}, 0.1),
+        ({"ground": {"stiffness": 1e6}, "launch": {"position": [0, 0, 0.5177], "velocity": [0, 0, -0.3]}}, 0.1),
+        ({"ground": {"stiffness": 1e4}, "gravity": 150, "launch": {"position": [0, 0, 1], "velocity": [0, 0, 0]}}, 0.1),
+        (
+            {
+                "ground": {"stiffness": 1e6},
+                "gravity": 399,
+                "launch": {"position": [0, 0, 0.5228], "velocity": [0, 0, 0]},
+            },
+            0.02,
+        ),
     ],
 )
 @pytest.mark.long
-def test_all_that_is_allowed_is_measured(scene):
+def test_all_that_is_allowed_is_measured(scene, shortest):
     """Near the ends of what is allowed: deep, shallow, heavy, and both."""
-    found = bounce_map.measure(from_mapping(scene), omega_h=(0.02, 1.999), count=20, phases=50)
+    found = bounce_map.measure(from_mapping(scene), omega_h=(shortest, 1.999), count=20, phases=50)
     np.testing.assert_allclose(largest(found), by_theory(found), rtol=0, atol=1e-10)
     assert (found.largest_with_gravity < 1 + 1.2 * largest(found).max()).all()

@@ -1,4 +1,4 @@
-"""A process that reads spoilt files: python -m tests.fuzz.worker READER FIRST COUNT.
+"""A process that reads spoilt files: python -m tests.fuzz.worker READER FIRST COUNT, and more such three.
 
 Prints a case before it is tried, so that one that ends the process, or does not end, is known.
 """
@@ -50,4 +50,5 @@ def main(name: str, first: int, count: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])) > 0)
+    asked = zip(sys.argv[1::3], map(int, sys.argv[2::3]), map(int, sys.argv[3::3]), strict=True)
+    sys.exit(sum(main(*each) for each in asked) > 0)

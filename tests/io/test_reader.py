@@ -55,10 +55,9 @@ def by_h5py(path, names):
 
 
 def by_h5dump(path, names):
-    return {
-        name: numbers(re.search(r"DATA \{(.*?)\}", output("h5dump", "-y", "-m", "%.17g", "-d", name, path), re.S)[1])
-        for name in names
-    }
+    text = output("h5dump", "-y", "-m", "%.17g", *(word for name in names for word in ("-d", name)), path)
+    datasets = dict(re.findall(r'^DATASET "(.*?)" \{.*?^   DATA \{(.*?)\}', text, re.M | re.S))
+    return {name: numbers(datasets[name]) for name in names}
 
 
 def by_ncdump(path, names):

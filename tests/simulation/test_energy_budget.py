@@ -139,8 +139,17 @@ def test_the_first_step_of_a_throw_is_booked_with_its_spin(node_velocity):
     assert kept.kick_defect == pytest.approx(0, abs=1e-13)
 
 
-@pytest.mark.parametrize("preset", ["as_listed", "as_written"])
-@pytest.mark.parametrize("model", LANDING)
+@pytest.mark.parametrize(
+    ("preset", "model"),
+    [
+        ("as_listed", "tumbling"),
+        ("as_written", "sliding"),
+        ("as_listed", "vertical"),
+        pytest.param("as_written", "tumbling", marks=pytest.mark.broad),
+        pytest.param("as_listed", "sliding", marks=pytest.mark.broad),
+        pytest.param("as_written", "vertical", marks=pytest.mark.broad),
+    ],
+)
 @pytest.mark.long
 def test_a_million_steps_close_to_the_last_digits(preset, model):
     kept = ledger(paper(preset), model=model, steps=1_000_000)

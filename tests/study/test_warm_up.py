@@ -25,30 +25,44 @@ from stiffdice.study import config, warm_up
 runs = list(warm_up.short_runs(config.load(sys.argv[1])))
 print(len(runs), sum(map(warm_up.load, runs)), len(run._march.dispatcher.overloads))
 """
-# Runs one of them.
+# Runs one of them, and copies the kernels that it takes to a folder.
 RUN = """
+import shutil, sys
+from stiffdice.dynamics.compiling.kernel_files import KernelFiles
 from stiffdice.scene import scene
 from stiffdice.simulation.run import simulate
+
+path, taken = KernelFiles.path, set()
+
+def noted(self, key):
+    taken.add(path(self, key))
+    return path(self, key)
+
+KernelFiles.path = noted
 simulate(scene.load("config/scenes/figure-09.yaml"), model="vertical", steps=1, every=1)
+for kernel in taken:
+    shutil.copy(kernel, sys.argv[1])
 """
 
 
-def python(text: str, cache: Path) -> str:
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
-    (cache / "which.yaml").write_text(STUDY)
-    command = [sys.executable, "-c", text, str(cache / "which.yaml")]
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+def python(text: str, *words: object, **environment: str) -> str:
+    command = [sys.executable, "-c", text, *map(str, words)]
+    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 @pytest.mark.long
 def test_what_is_stored_is_loaded_and_nothing_is_compiled(tmp_path):
-    runs, *loaded = python(LOAD, tmp_path).split()
+    study, cache = tmp_path / "which.yaml", {"NUMBA_CACHE_DIR": str(tmp_path)}
+    study.write_text(STUDY)
+    runs, *loaded = python(LOAD, study, **cache).split()
     assert int(runs) == 2
     assert loaded == ["0", "0"]
     assert not list(tmp_path.rglob("*.nbc"))
-    python(RUN, tmp_path)
+    (kernels,) = tmp_path.glob("stiffdice/kernels-*")
+    python(RUN, kernels)
     stored = sorted(tmp_path.rglob("*.nbc"))
-    assert python(LOAD, tmp_path).split() == [runs, "0", "1"]  # the kernels of the ledger are not there
+    assert stored
+    assert python(LOAD, study, **cache).split() == [runs, "0", "1"]  # the kernels of the ledger are not there
     assert sorted(tmp_path.rglob("*.nbc")) == stored

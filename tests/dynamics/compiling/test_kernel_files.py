@@ -48,12 +48,12 @@ def test_a_kernel_cut_short_anywhere_is_made_again(kernels):
 
 
 @pytest.mark.long
-def test_a_kernel_with_any_bit_flipped_is_made_again(kernels):
+def test_a_kernel_with_a_bit_of_any_byte_flipped_is_made_again(kernels):
     kernels.save("key", KERNEL)
     whole = kernels.path("key").read_bytes()
-    for bit in range(8 * len(whole)):
+    for place in range(len(whole)):
         damaged = bytearray(whole)
-        damaged[bit // 8] ^= 1 << bit % 8
+        damaged[place] ^= 1 << place % 8
         kernels.path("key").write_bytes(damaged)
         assert kernels.load("key") is None
     assert is_healed(kernels)
@@ -93,7 +93,7 @@ import sys
 from pathlib import Path
 from stiffdice.dynamics.compiling.kernel_files import KernelFiles
 kernels = KernelFiles(Path(sys.argv[1]), "march", "stamp")
-for k in range(400):
+for k in range(100):
     if k % 7 == 0:
         kernels.path("shared").write_bytes(b"cut short")
     for key in ("shared", sys.argv[2]):
@@ -187,7 +187,7 @@ def stored(tmp_path_factory):
     return folder, energies(folder / "cache")[0]
 
 
-@pytest.mark.parametrize("damage", [flipped, made_a_folder])
+@pytest.mark.parametrize("damage", [flipped, pytest.param(made_a_folder, marks=pytest.mark.broad)])
 @pytest.mark.long
 def test_a_damaged_kernel_is_compiled_again_and_says_the_same(stored, damage):
     folder, said = stored

@@ -25,7 +25,8 @@ def test_steps_are_those_of_the_fastest_contact():
 
 @pytest.mark.long
 def test_faces_stand_at_steps_near_the_limit():
-    found = coarse_steps.measure(LOADED, omega_h=[1.9, 1.0], finest=0.4, throws=2000, path_omega_h=[1.0], paths=1)
+    one_path = {"path_omega_h": [1.0], "path_schemes": ["rk4"], "paths": 1}
+    found = coarse_steps.measure(LOADED, omega_h=[1.9, 1.0], finest=0.4, throws=2000, **one_path)
     far, near = found.total_variation.values
     assert near < found.sampling_95.values[1]
     assert far > 2 * found.sampling_95.values[0]

@@ -29,7 +29,7 @@ def test_a_toss_that_is_far_off_counts_no_more_than_one_that_is_off():
 def test_the_ground_that_made_the_tosses_is_found():
     """To the last spacing that is tried, 0.005, and beyond it by what steps of another size change."""
     physics = Physics(0.33, 0.225, 0.004)
-    tosses, launches = toss_files.made(20, physics)
+    tosses, launches = toss_files.made(10, physics)
     found = fit.fit(tosses, launches, toss_files.SCENE, Physics(contact_time=0.004))
     assert found.restitution == pytest.approx(physics.restitution, abs=0.02)
     assert found.friction == pytest.approx(physics.friction, abs=0.006)
@@ -71,13 +71,13 @@ def test_bad_options_are_told(tmp_path):
 
 @pytest.fixture(scope="module")
 def few(tmp_path_factory):
-    return str(toss_files.stored(toss_files.some(9), tmp_path_factory.mktemp("tosses") / "few.h5"))
+    return str(toss_files.stored(toss_files.some(6), tmp_path_factory.mktemp("tosses") / "few.h5"))
 
 
 @pytest.mark.long
 def test_measured_are_a_row_for_each_launch_and_contact_time(few):
     found = fit.measure(toss_files.SCENE, data=few, contact_time=(0.005, 0.01))
-    assert dict(found.path.sizes) == {"source": 2, "contact_time": 2, "toss": 6}
+    assert dict(found.path.sizes) == {"source": 2, "contact_time": 2, "toss": 4}
     assert (found.restitution_low <= found.restitution).all()
     assert (found.restitution <= found.restitution_high).all()
     assert float(found.attrs["landscape_contact_time"]) == 0.005
