@@ -44,7 +44,8 @@ def test_a_result_that_is_a_link_to_nowhere_is_one_line_and_such_a_log_gives_way
         "bring that back, or remove the link"
     )
     assert told in status(project).stdout
-    done = project.run()
+    words = ("--cores", "2", "study", "--config", "study=small")
+    done = run_module("snakemake", *words, cwd=project.folder, environment=project.environment)
     assert done.returncode == 2
     assert f"stiffdice: {told}\n" in done.stderr and "Traceback" not in done.stderr
     figure.unlink()
