@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import pytest
 import yaml
 
 import stiffdice
+from tests.forks import run_module
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -113,14 +112,6 @@ def test_the_configuration_that_is_deployed_names_a_study_and_is_explained():
 @pytest.mark.long
 def test_the_snakefile_at_the_top_is_the_workflows():
     asked = [[], ["--snakefile", "workflow/Snakefile"]]
-    rules = [
-        subprocess.run(
-            [sys.executable, "-m", "snakemake", "--list-rules", *more],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for more in asked
-    ]
-    assert rules[0] == rules[1] != ""
+    said = [run_module("snakemake", "--list-rules", *more, cwd=ROOT) for more in asked]
+    assert [done.returncode for done in said] == [0, 0], said
+    assert said[0].stdout == said[1].stdout != ""

@@ -195,7 +195,7 @@ time.sleep(600)
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what a process uses")
 @pytest.mark.long
 def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
-    """Which exchanges an environment of an earlier version of stiffdice, too."""
+    """Which exchanges an environment of an earlier version of stiffdice, too, though one before it was killed."""
     project, old, new = due
     before = project.venv.readlink().name
     user = project.start(project.venv.resolve() / "bin/python", "-c", USING)
@@ -208,6 +208,8 @@ def test_engines_stay_and_so_does_what_is_used_until_the_next_set_up(due):
     user.communicate()
     project.lock("requirements", wheel(project.folder / "wheels", "tiny", old))
     as_earlier_versions_left_it(project)
+    interrupt(project, signal.SIGKILL)
+    assert (project.version("tiny"), project.version("engine"), project.venv.is_symlink()) == (new, "1.0", False)
     assert project.call()[0] == 0
     assert (project.version("tiny"), project.version("engine"), project.venv.is_symlink()) == (old, "1.0", True)
     assert project.environments() == {project.venv.readlink().name}
@@ -232,26 +234,25 @@ def test_a_set_up_that_fails_leaves_the_old_environment(due):
     assert project.environments() == {project.venv.readlink().name}
 
 
-@pytest.mark.parametrize(
-    "ways",
-    [
-        pytest.param([signal.SIGKILL], marks=pytest.mark.long),
-        pytest.param([signal.SIGTERM, signal.SIGINT], marks=pytest.mark.broad),
-    ],
-    ids=["killed", "told to stop"],
-)
-def test_an_interrupted_set_up_leaves_the_old_environment(due, ways):
+@pytest.mark.broad
+def test_an_interrupted_set_up_leaves_the_old_environment(due):
     project, old, new = due
     leads = project.venv.readlink()
-    for way in ways:
-        started = project.start()
-        wait_for(lambda: len(project.environments()) == 2)
-        os.killpg(started.pid, way)
-        assert started.communicate() and started.returncode != 0
+    for way in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
+        interrupt(project, way)
         assert (project.venv.readlink(), project.version("tiny"), project.version("engine")) == (leads, old, "1.0")
     assert project.call()[0] == 0
     assert (project.version("tiny"), project.version("engine")) == (new, "1.0")
     assert project.environments() == {project.venv.readlink().name}
+
+
+def interrupt(project: Project, way: signal.Signals) -> None:
+    """Start a set-up, and stop it once it has begun to build an environment."""
+    before = len(project.environments())
+    started = project.start()
+    wait_for(lambda: len(project.environments()) > before)
+    os.killpg(started.pid, way)
+    assert started.communicate() and started.returncode != 0
 
 
 @pytest.mark.broad

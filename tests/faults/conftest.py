@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import json
 import os
 import shutil
 import subprocess
@@ -14,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 from tests import rounds
+from tests.shared import made_once
 
 ROOT = Path(__file__).parent.parent.parent
 SMALL = {
@@ -39,7 +38,7 @@ SMALL = {
             "options": {"steps": [10000, 20000]},
         }
     },
-    "figures": {"books": {"draw": "energy-budget", "of": ["books"], "title": "Books"}},
+    "figures": {"position": {"draw": "position", "run": "stiff", "title": "Position"}},
     "tables": {"answers": {"tell": "paper-questions", "of": ["steps"], "title": "Answers"}},
 }
 
@@ -68,13 +67,15 @@ class Project:
         (folder / "results").mkdir(exist_ok=True)
         return Project(folder)
 
-    def command(self, by: str = "run.py", *arguments: str) -> list[str]:
+    def command(self, by: str = "run.py", *arguments: str, target: str = "study") -> list[str]:
         tool = {"run.py": ["workflow/run.py"], "snakemake": ["-m", "snakemake"]}[by]
-        return [sys.executable, *tool, "--cores", "2", "study", *arguments, "--config", "study=small"]
+        return [sys.executable, *tool, "--cores", "2", target, *arguments, "--config", "study=small"]
 
-    def run(self, by: str = "run.py", *arguments: str, **changes: str) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, by: str = "run.py", *arguments: str, target: str = "study", **changes: str
+    ) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            self.command(by, *arguments),
+            self.command(by, *arguments, target=target),
             cwd=self.folder,
             env=self.environment | changes,
             capture_output=True,
@@ -99,17 +100,14 @@ class Project:
 @pytest.fixture(scope="session")
 def undisturbed(tmp_path_factory) -> Project:
     """The project whose study ran undisturbed; of all workers the first makes it. Not to be changed."""
-    top = tmp_path_factory.getbasetemp()
-    top = top.parent if "PYTEST_XDIST_WORKER" in os.environ else top
-    with (top / "undisturbed.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        told = top / "undisturbed.json"
-        if not told.exists():
-            project = Project.new(top / "undisturbed")
-            begun = time.monotonic()
-            done = project.run()
-            assert done.returncode == 0, done.stdout + done.stderr
-            told.write_text(json.dumps({"seconds": time.monotonic() - begun}))
-    project = Project(top / "undisturbed")
-    project.seconds = json.loads(told.read_text())["seconds"]
+
+    def make(folder: Path) -> dict[str, float]:
+        begun = time.monotonic()
+        done = Project.new(folder).run()
+        assert done.returncode == 0, done.stdout + done.stderr
+        return {"seconds": time.monotonic() - begun}
+
+    folder, said = made_once(tmp_path_factory, "undisturbed", make)
+    project = Project(folder)
+    project.seconds = said["seconds"]
     return project

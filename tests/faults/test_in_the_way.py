@@ -36,15 +36,16 @@ def may_be_bound() -> bool:
 def test_a_result_that_is_a_link_to_nowhere_is_one_line_and_such_a_log_gives_way(undisturbed, tmp_path):
     """So do logs and benchmarks of another user, where this is root, who can give files away."""
     project, bound = undisturbed.copy(tmp_path / "project"), may_be_bound()
-    figure = project.results / "figures/books.svg"
+    figure = project.results / "figures/position.svg"
     figure.unlink()
-    figure.symlink_to("/nowhere/books.svg")
+    figure.symlink_to("/nowhere/position.svg")
     told = (
-        "results/small/figures/books.svg: a link to /nowhere/books.svg, which is not there; "
+        "results/small/figures/position.svg: a link to /nowhere/position.svg, which is not there; "
         "bring that back, or remove the link"
     )
     assert told in status(project).stdout
-    done = project.run()
+    words = ("--cores", "2", "study", "--config", "study=small")
+    done = run_module("snakemake", *words, cwd=project.folder, environment=project.environment)
     assert done.returncode == 2
     assert f"stiffdice: {told}\n" in done.stderr and "Traceback" not in done.stderr
     figure.unlink()

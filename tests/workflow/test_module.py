@@ -89,6 +89,12 @@ class User:
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
+    def dry_run(self, *words: str, **environment: str) -> str:
+        """Return what Snakemake would do."""
+        done = run_module("snakemake", "-n", *words, cwd=self.folder, environment=self.environment | environment)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout + done.stderr
+
     def files(self, top: str) -> set[str]:
         return {str(path.relative_to(self.folder / top)) for path in (self.folder / top).rglob("*") if path.is_file()}
 
@@ -98,7 +104,7 @@ def test_it_makes_the_study_of_the_users_folder_there(tmp_path):
     user = User(tmp_path, MODULE.format(snakefile=f"{ROOT}/workflow/Snakefile") + "use rule * from dice\n", STUDY)
     user.snakemake()
     assert {"runs/one.as_written.h5", "figures/position.svg"} <= user.files("results/mine")
-    assert "Nothing to be done" in user.snakemake("-n")
+    assert "Nothing to be done" in user.dry_run()
     told = run_module("stiffdice.cli", "status", "mine", cwd=tmp_path, environment=user.environment)
     assert (told.returncode, "2 of 2 done" in told.stdout) == (0, True), told
     changed = {path for path, time in before.items() if not path.is_dir() and path.stat().st_mtime_ns != time}
@@ -114,10 +120,10 @@ def test_rules_and_results_may_have_a_prefix_beside_the_users_own(tmp_path):
     assert not (tmp_path / "results").exists()
     log = (tmp_path / "die/results/mine/logs/frontier/edges.log").read_text()
     assert "made: sweeps/edges/frontier.h5 " in log
-    assert "Nothing to be done" in user.snakemake("-n", "die_study")
+    assert "Nothing to be done" in user.dry_run("die_study")
     shutil.rmtree(tmp_path / ".snakemake")  # what Snakemake remembers; the logs say what was asked
     (tmp_path / "scenes/mine.yaml").write_text((tmp_path / "scenes/mine.yaml").read_text() + "gravity: 9.7\n")
-    due = user.snakemake("-n", "die_study", "--rerun-triggers", "mtime")
+    due = user.dry_run("die_study", "--rerun-triggers", "mtime")
     rules = {*re.findall(r"^die_(\w+) +1$", due, re.MULTILINE)}
     assert rules == {"figure", "study", "timing", "trajectory"}
 
@@ -142,7 +148,7 @@ def test_it_is_deployed_from_a_repository_as_the_catalogue_does(tmp_path):
     elsewhere |= {"GIT_CONFIG_VALUE_0": "https://github.com/owner/dice", "XDG_CACHE_HOME": str(tmp_path / "cache")}
     user.snakemake(**elsewhere)
     assert {"runs/one.as_written.h5", "figures/position.svg"} <= user.files("results/mine")
-    assert "Nothing to be done" in user.snakemake("-n", **elsewhere)
+    assert "Nothing to be done" in user.dry_run(**elsewhere)
 
 
 def test_a_study_that_is_not_there_is_said_in_one_line(tmp_path):

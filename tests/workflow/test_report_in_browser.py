@@ -14,6 +14,7 @@ import pytest
 import yaml
 from tests.archive import packing
 from tests.conftest import CHROMIUM
+from tests.forks import run_module
 from tests.workflow.test_workflow import TINY, Project
 
 from stiffdice.archive.pack import pack
@@ -120,12 +121,12 @@ def chapters(tmp_path_factory):
         (project.folder / f"config/{name}.yaml").write_text(yaml.safe_dump({"question": "Why?", **few}))
     files = [f"results/{name}/figures/position.svg" for name in ("stability", "paper", "tiny")]
     (project.folder / "results/pair").mkdir()
-    for arguments in ((*files, "--cores", "2"), ("finished", "--report", "results/report.html", *LOOK)):
-        command = [sys.executable, "-m", "snakemake", *arguments]
-        done = subprocess.run(
-            command, cwd=project.folder, env=project.environment, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
+    command = [sys.executable, "workflow/run.py", "--cores", "2", *files]
+    there = {"cwd": project.folder, "env": project.environment}
+    subprocess.run(command, **there, capture_output=True, text=True, check=True)
+    report = ("finished", "--report", "results/report.html", *LOOK)
+    done = run_module("snakemake", *report, cwd=project.folder, environment=project.environment)
+    assert done.returncode == 0, done.stderr
     assert "left out: pair is not finished: make status STUDY=pair" in done.stderr
     return project.folder / "results/report.html"
 

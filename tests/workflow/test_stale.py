@@ -11,51 +11,15 @@ from pathlib import Path
 
 import pytest
 from tests.forks import run_module
-from tests.workflow.test_workflow import TINY, Project
 
 pytestmark = pytest.mark.workflow
-# One of each kind: a survey needs a refined sweep, an animation a cube that turns.
-STUDY = {
-    **TINY,
-    "runs": {
-        **TINY["runs"],
-        "turn": {
-            "scene": "config/scenes/figure-01.yaml",
-            "presets": ["as_listed"],
-            "model": "tumbling",
-            "steps": 20000,
-            "every": 2000,
-        },
-    },
-    "sweeps": {"steps": {**TINY["sweeps"]["steps"], "refine": 1}},
-    "experiments": {"books": TINY["experiments"]["books"]},
-    "figures": {
-        "position": TINY["figures"]["position"],
-        "frontier": TINY["figures"]["frontier"],
-        "movie": {"draw": "animation", "run": "turn", "title": "Movie"},
-        "books": TINY["figures"]["books"],
-    },
-}
 SWEPT = {"shard": 3, "survey": 1, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """A project whose study has run."""
-    project = Project(tmp_path_factory.mktemp("stale"))
-    project.plan(STUDY)
-    done = project.make("--cores", "2")
-    assert done.returncode == 0, done.stderr
-    return project
-
-
 @pytest.fixture
-def copied(finished, tmp_path):
-    """A copy for one test, as `cp -a` makes it."""
-    shutil.copytree(finished.folder, tmp_path / "project", symlinks=True)
-    project = object.__new__(Project)
-    project.folder = tmp_path / "project"
-    return project
+def copied(made, tmp_path):
+    """A copy for one test."""
+    return made.copy(tmp_path / "project")
 
 
 def forget(project):
@@ -96,7 +60,10 @@ def replaced_by_tar(old, new):
     [
         (replaced_by_mv, "figure-09", {"trajectory": 2, "experiment": 1, "figure": 2}),
         pytest.param(
-            replaced_by_cp, "figure-01", {"trajectory": 1, "timing": 1, "animation": 1}, marks=pytest.mark.broad
+            replaced_by_cp,
+            "figure-01",
+            {"trajectory": 1, "experiment": 1, "timing": 1, "figure": 1, "animation": 1},
+            marks=pytest.mark.broad,
         ),
         (replaced_by_tar, "figure-13", SWEPT),
     ],
@@ -115,16 +82,16 @@ def test_an_older_scene_is_run(copied, tmp_path, replaced, scene, due):
 @pytest.mark.parametrize(
     ("before", "after", "due"),
     [
-        ("steps: 10000", "steps: 20000", {"trajectory": 2, "figure": 1}),
+        ("steps: 10000\n", "steps: 20000\n", {"trajectory": 2, "figure": 1}),
         pytest.param("every: 2000", "every: 1000", {"trajectory": 1, "animation": 1}, marks=pytest.mark.broad),
         pytest.param("- 20000", "- 30000", {"experiment": 1, "figure": 1}, marks=pytest.mark.broad),
-        pytest.param("rounds: 1", "rounds: 2", {"timing": 1}, marks=pytest.mark.broad),
+        pytest.param("rounds: 1", "rounds: 2", {"timing": 1, "figure": 1}, marks=pytest.mark.broad),
         pytest.param("members: 4", "members: 5", SWEPT, marks=pytest.mark.broad),
         ("early_stop: false", "early_stop: false\n    criteria: {energy: 0.2}", SWEPT | {"shard": 1}),
         ("title: Position", "title: Place", {"figure": 1}),
         pytest.param("title: Movie", "title: Film", {"animation": 1}, marks=pytest.mark.broad),
         pytest.param("title: Answers", "title: Replies", {"table": 1}, marks=pytest.mark.broad),
-        pytest.param("question:", "dpi: 60\nquestion:", {"figure": 3, "animation": 1}, marks=pytest.mark.broad),
+        pytest.param("question:", "dpi: 60\nquestion:", {"figure": 4, "animation": 1}, marks=pytest.mark.broad),
     ],
 )
 @pytest.mark.long
@@ -187,8 +154,15 @@ def test_what_is_stale_is_told_refused_and_made_again(copied):
     told = stiffdice(copied, "archive", "tiny")
     assert (told.returncode, told.stderr.count("\n")) == (2, 1)
     assert f"{run}: made from other scene, as 5 of " in told.stderr
-    before = copied.results("runs/stiff*.h5", "experiments/*", "figures/position.svg", "figures/books.svg")
-    others = copied.results("runs/turn*", "sweeps/**/*.h5", "tables/*", "figures/frontier.*", "benchmarks/timings/*.h5")
+    before = copied.results("runs/stiff*.h5", "experiments/books.h5", "figures/position.svg", "figures/books.svg")
+    others = copied.results(
+        "runs/turn*",
+        "experiments/work.h5",
+        "sweeps/**/*.h5",
+        "tables/*",
+        "figures/frontier.*",
+        "benchmarks/timings/*.h5",
+    )
     done = copied.make("--cores", "2")
     assert done.returncode == 0, done.stderr
     assert all(content != before[name] for name, content in copied.results(*before).items())
@@ -229,7 +203,7 @@ def test_another_file_in_the_place_of_a_result_is_seen_of_every_kind(copied, tmp
     assert told.returncode == 3
     assert "10 stale" in told.stdout
     assert "figure position  its .svg is not what its job made: another file in its place, or changed" in told.stdout
-    more = {"shard": 1, "trajectory": 1, "experiment": 1, "timing": 1, "figure": 3, "animation": 1}
+    more = {"shard": 1, "trajectory": 1, "experiment": 1, "timing": 1, "figure": 4, "animation": 1}
     assert copied.jobs_due() == SWEPT | more
     for folder in ("results/tiny", str(shutil.copytree(copied.folder / "results/tiny", tmp_path / "elsewhere"))):
         told = stiffdice(copied, "verify", folder)

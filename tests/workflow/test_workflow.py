@@ -33,9 +33,19 @@ ROOT = Path(__file__).parent.parent.parent
 WORK = {"measure": "work-precision", "scene": "config/scenes/figure-01.yaml", "set": ["duration=3"]}
 FEW = {"stiffness": [100], "per_decade": 1, "methods": ["symplectic_euler", "scipy_lsoda"]}
 TITLE = "Books </script><script>alert(1)</script>"
+# One of each kind: a survey needs a refined sweep, an animation a cube that turns.
 TINY = {
     "question": "Does all of it work?",
-    "runs": {"stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10}},
+    "runs": {
+        "stiff": {"scene": "config/scenes/figure-09.yaml", "model": "sliding", "steps": 10000, "every": 10},
+        "turn": {
+            "scene": "config/scenes/figure-01.yaml",
+            "presets": ["as_listed"],
+            "model": "tumbling",
+            "steps": 20000,
+            "every": 2000,
+        },
+    },
     "sweeps": {
         "steps": {
             "scene": "config/scenes/figure-13.yaml",
@@ -45,6 +55,7 @@ TINY = {
             "omega_h": {"from": 3.0, "to": 0.3, "count": 12},
             "members": 4,
             "early_stop": False,
+            "refine": 1,
         },
     },
     "experiments": {
@@ -59,6 +70,7 @@ TINY = {
     "figures": {
         "position": {"draw": "position", "run": "stiff", "title": "Position"},
         "frontier": {"draw": "frontier", "of": ["steps"], "title": "Frontier"},
+        "movie": {"draw": "animation", "run": "turn", "title": "Movie"},
         "books": {"draw": "energy-budget", "of": ["books"], "title": TITLE},
         "times": {"draw": "work-precision", "of": ["work"], "timings": ["work"], "title": "Times"},
     },
@@ -67,22 +79,28 @@ TINY = {
 # What two rebuilds share, whatever their shards are: all but times, and the figures that show them.
 DATA = ("runs/*.h5", "sweeps/steps/sweep.h5", "sweeps/steps/frontier.*", "experiments/*", "tables/*", "figures/[!t]*")
 # What is due when all runs of the sweep are.
-AGAIN = {"shard": 2, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
+AGAIN = {"shard": 3, "survey": 1, "collect": 1, "frontier": 1, "figure": 1, "table": 1}
 pytestmark = pytest.mark.workflow
 
 
 class Project:
     """A copy of the project whose files a test may change."""
 
-    def __init__(self, folder: Path, *, own_source: bool = False):
+    def __init__(self, folder: Path):
         self.folder = folder
-        for name in ("workflow", "config", *(["src"] if own_source else [])):
+        for name in ("workflow", "config"):
             shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-        if not own_source:  # another place would be compiled again
-            (folder / "src").symlink_to(ROOT / "src")
+        (folder / "src").symlink_to(ROOT / "src")
         (folder / "profiles").symlink_to("workflow/profiles")
         (folder / "results").mkdir()
         self.plan(TINY)
+
+    @classmethod
+    def at(cls, folder: Path) -> Project:
+        """Return the project that is in a folder already."""
+        project = cls.__new__(cls)
+        project.folder = folder
+        return project
 
     def plan(self, study: dict) -> None:
         (self.folder / "config" / "tiny.yaml").write_text(yaml.safe_dump(study))
@@ -135,11 +153,11 @@ class Project:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """A project whose study has run; tests that change it take their changes back."""
-    project = Project(tmp_path_factory.mktemp("finished"), own_source=True)
-    project.made = project.make("--cores", "2")
-    assert project.made.returncode == 0, project.made.stderr
+def finished(made, tmp_path_factory):
+    """A project whose study has run, with sources of its own; tests that change it take their changes back."""
+    project = made.copy(tmp_path_factory.mktemp("finished") / "project")
+    (project.folder / "src").unlink()
+    shutil.copytree(ROOT / "src", project.folder / "src", ignore=shutil.ignore_patterns("__pycache__"))
     return project
 
 
@@ -171,7 +189,7 @@ def test_all_files_are_there_and_open(finished):
             assert min(image.size) > 300
         assert "<svg" in (top / "figures" / f"{name}.svg").read_text()
     hdf5 = sorted(top.rglob("*.h5"))
-    assert len(hdf5) == 2 + 2 + 2 + 2 + 1  # runs, shards, sweep and frontier, experiments, timing
+    assert len(hdf5) == 3 + 3 + 1 + 2 + 2 + 1  # runs, shards, survey, sweep and frontier, experiments, timing
     for path in hdf5:
         with xr.open_dataset(path) as found:
             assert found.attrs["format_version"] == FORMAT_VERSION
@@ -189,9 +207,12 @@ def test_a_stored_run_is_what_the_simulator_says(finished, preset):
 
 
 def test_the_collected_sweep_is_the_sweep_done_in_one_go(finished, tmp_path):
+    """Or in two, as the second round looks where the first has found an edge."""
     plan = planned(finished).sweeps["steps"]
-    compute_shard(plan, rounds.scan(plan), tmp_path / "whole.h5")
-    whole = collect(parts(tmp_path / "whole.h5", 10), plan.criteria, plan.config)
+    scan, refined = tmp_path / "scan.h5", tmp_path / "refined.h5"
+    compute_shard(plan, rounds.scan(plan), scan)
+    compute_shard(plan, partition.refined(plan, rounds.judged(plan, [scan]), 1), refined)
+    whole = collect((part for path in (scan, refined) for part in parts(path, 10)), plan.criteria, plan.config)
     xr.testing.assert_identical(open_file(finished.folder / "results/tiny/sweeps/steps/sweep.h5"), whole)
 
 
@@ -208,9 +229,12 @@ def test_the_table_says_what_the_file_says(finished):
 def test_a_table_maps_the_shards_names_back(finished):
     with (finished.folder / "results/tiny/sweeps/steps/shards.csv").open() as file:
         rows = list(csv.DictReader(file))
-    plan = planned(finished).sweeps["steps"]
-    assert {row["shard"] for row in rows} == set(partition.of(plan))
-    assert sum(int(row["cells"]) for row in rows) == sum(len(plan.scan(column)) for column in plan.columns())
+    plan, cells = planned(finished).sweeps["steps"], {row["shard"]: int(row["cells"]) for row in rows}
+    shards = partition.of(plan)
+    assert cells.keys() == shards.keys()
+    scanned = sum(cells[name] for name in partition.rounds(shards, 0))
+    assert scanned == sum(len(plan.scan(column)) for column in plan.columns())
+    assert sum(cells.values()) == open_file(finished.folder / "results/tiny/sweeps/steps/sweep.h5").sizes["cell"]
 
 
 def test_a_rerun_with_nothing_changed_does_nothing(finished):
@@ -225,15 +249,14 @@ def test_a_rerun_with_nothing_changed_does_nothing(finished):
 @pytest.mark.long
 def test_a_changed_style_redraws_only(finished, edited):
     edited("src/stiffdice/report/figures/style.py", lambda text: text.replace('"font.size": 7', '"font.size": 8'))
-    assert finished.jobs_due() == {"figure": 4}
+    assert finished.jobs_due() == {"figure": 4, "animation": 1}
 
 
 @pytest.mark.long
 def test_a_changed_kernel_recomputes_what_it_touched(finished, edited):
     edited("src/stiffdice/dynamics/contact.py", lambda text: text.replace("push = times(fn", "push = times(1.0 * fn"))
-    runs = {"shard": 2, "trajectory": 2, "experiment": 2, "timing": 1}
-    everything = runs | {"collect": 1, "frontier": 1, "figure": 4, "table": 1}
-    assert finished.jobs_due() == everything
+    runs = {"trajectory": 3, "experiment": 2, "timing": 1}
+    assert finished.jobs_due() == AGAIN | runs | {"figure": 4, "animation": 1}
 
 
 @pytest.mark.long
@@ -263,10 +286,10 @@ def test_a_changed_ensemble_leaves_single_runs_alone(finished, edited):
 @pytest.mark.parametrize(
     ("script", "due"),
     [
-        pytest.param("figure", {"figure": 4}, marks=pytest.mark.broad),
+        pytest.param("figure", {"figure": 4, "animation": 1}, marks=pytest.mark.broad),
         pytest.param("table", {"table": 1}, marks=pytest.mark.broad),
         pytest.param("measure", {"experiment": 2, "timing": 1, "figure": 2}, marks=pytest.mark.broad),
-        ("collect", {"collect": 1, "frontier": 1, "figure": 1, "table": 1}),
+        ("collect", {"survey": 1, "collect": 1, "frontier": 1, "figure": 1, "table": 1}),
     ],
 )
 @pytest.mark.long
@@ -284,9 +307,9 @@ def test_a_touched_file_is_no_change(finished):
 
 @pytest.mark.long
 def test_a_changed_tolerance_is_judged_not_computed(finished, edited):
-    """Unless runs were stopped by the old one."""
+    """Unless runs were stopped by the old one; only the second round is where the first has edges, which it moves."""
     edited("config/tiny.yaml", lambda text: text + "criteria: {apex: 0.5}\n")
-    assert finished.jobs_due() == {"collect": 1, "frontier": 1, "figure": 1, "table": 1}
+    assert finished.jobs_due() == AGAIN | {"shard": 1}
     edited("config/tiny.yaml", lambda text: text.replace("early_stop: false", "early_stop: true"))
     assert finished.jobs_due() == AGAIN
 
@@ -415,10 +438,9 @@ def test_neither_shard_size_nor_order_nor_a_kill_changes_a_number(finished, tmp_
     assert other.results(*DATA) == finished.results(*DATA)
 
 
-def test_where_the_time_went_is_told(finished):
-    done = finished.made
-    assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", done.stdout, re.MULTILINE)
-    assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", done.stdout, re.MULTILINE)
+def test_where_the_time_went_is_told(made):
+    assert re.search(r"^collect +1 +\d+\.\d s +0\.0 s$", made.stdout, re.MULTILINE)
+    assert re.search(r"^\d+ s on 2 cores: \d+% of them simulation", made.stdout, re.MULTILINE)
     # Before it, how long it will take, of all jobs; and at last what to open.
-    assert len(re.findall(r"^stiffdice: tiny: 14 jobs, about \d+ s on 2 cores", done.stderr, re.MULTILINE)) == 1
-    assert done.stdout.splitlines()[-1] == f"open first: results/tiny/figures/books.svg ({TITLE})"
+    assert len(re.findall(r"^stiffdice: tiny: 18 jobs, about \d+ s on 2 cores", made.stderr, re.MULTILINE)) == 1
+    assert made.stdout.splitlines()[-1] == f"open first: results/tiny/figures/books.svg ({TITLE})"

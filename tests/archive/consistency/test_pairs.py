@@ -39,8 +39,9 @@ def changed(dataset, name, change):
 
 @pytest.mark.parametrize("scheme", ["symplectic_euler", "velocity_verlet", "rk4"])
 def test_what_was_written_can_be_so(scheme):
-    assert check.kind_of(run_of(scheme=scheme)) == "pair"
-    assert check.problems(run_of(scheme=scheme)) == []
+    run = run_of(scheme=scheme)
+    assert check.kind_of(run) == "pair"
+    assert check.problems(run) == []
 
 
 def test_boxes_loaded_ones_and_runs_that_end_early_can_be_so():
