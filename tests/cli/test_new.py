@@ -81,7 +81,7 @@ def test_nothing_is_replaced_and_nothing_is_half_done(stiffdice, project, there)
     assert sum((project / name).exists() for name in ("config/scenes/mine.yaml", "config/mine.yaml")) == 1
 
 
-@pytest.mark.long
+@pytest.mark.broad  # docs/tutorial/first-study.md has that of the paper's scene made
 @pytest.mark.workflow
 def test_the_study_gives_its_figures(stiffdice, project):
     for name in ("Snakefile", "workflow", "src", "requirements", "pyproject.toml"):

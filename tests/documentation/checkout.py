@@ -14,12 +14,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from tests.documentation.pages import ROOT, Block, lines, without_comment
+from tests.documentation.pages import ROOT, Block, without_comment
 
 from stiffdice.cli import main as cli
 
 # A line that needs no shell.
-_PLAIN = re.compile(r"(?:\.venv/bin/)?stiffdice [^|&;<>$*~`(]*")
+_PLAIN = re.compile(r"(?:\.venv/bin/)?stiffdice [^|&;<>$*~`(\n]*")
+
+
+def parts(script: str) -> list[str]:
+    """Return the plain lines that a script begins and ends with, one by one; what is between them is one part."""
+    rows = script.replace("\\\n", " ").splitlines()
+    told = [re.sub(r"^#.*", "", without_comment(row).strip()) for row in rows]
+    shelled = [k for k, row in enumerate(told) if row and not _PLAIN.fullmatch(row)]
+    first, last = (shelled[0], shelled[-1] + 1) if shelled else (len(rows), len(rows))
+    return list(filter(None, [*told[:first], "\n".join(rows[first:last]), *told[last:]]))
 
 
 class Ended(NamedTuple):
@@ -97,9 +106,9 @@ class Checkout:
         script = "".join(
             line for line in script.splitlines(keepends=True) if not line.startswith(block.left_out or "\0")
         )
-        plain = [without_comment(line) for line in lines(script)]
-        if "<<" in script or not all(_PLAIN.fullmatch(line) for line in plain):
-            return self.shell(script)
-        ends = [self.here(cli.main, shlex.split(line)[1:]) for line in plain]
+        ends = [
+            self.here(cli.main, shlex.split(part)[1:]) if _PLAIN.fullmatch(part) else self.shell(part)
+            for part in parts(script)
+        ]
         assert all(end.status == 0 for end in ends[:-1]), f"{block}: {ends}"
         return Ended(ends[-1].status, "".join(end.out for end in ends), "".join(end.err for end in ends))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.documentation.checkout import parts
 from tests.documentation.pages import blocks, commands, lines
 
 PAGE = """\
@@ -61,3 +62,11 @@ def test_a_line_is_split_into_simple_commands():
     )
     words = [[*commands(line)] for line in lines(script)]
     assert words == [[["stiffdice", "run", "a b.yaml", "-o", "out.h5"], ["head"]], [["cat"]]]
+
+
+def test_what_needs_a_shell_is_one_part_and_plain_lines_about_it_are_one_each():
+    held = "cat > a.yaml <<END\n  # kept\nstiffdice here\nEND"
+    after = ".venv/bin/stiffdice run a.yaml \\\n-o a.h5\n# after\nstiffdice inspect a.h5\n"
+    run, look = ".venv/bin/stiffdice run a.yaml  -o a.h5", "stiffdice inspect a.h5"
+    assert parts(f"stiffdice new a  # told\n\n{held}\n{after}") == ["stiffdice new a", held, run, look]
+    assert parts("stiffdice inspect a.h5 | head\n") == ["stiffdice inspect a.h5 | head"]

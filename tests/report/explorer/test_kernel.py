@@ -87,21 +87,21 @@ def compared_with_files(opened, folder, seeds):
 
 @pytest.mark.long
 def test_sliding_runs_are_the_stored_ones_to_the_last_bit(opened, tmp_path):
-    verdicts = compared_with_files(opened, tmp_path, range(50))
+    verdicts = compared_with_files(opened, tmp_path, range(20))
     assert {"passed", "energy_grew", "apex_rose"} <= verdicts, "all kinds of runs are among them"
 
 
 @pytest.mark.long
 @pytest.mark.broad
 def test_a_thousand_sliding_runs_are_the_stored_ones_to_the_last_bit(opened, tmp_path):
-    compared_with_files(opened, tmp_path, range(50, 1050))
+    compared_with_files(opened, tmp_path, range(20, 1020))
 
 
 @pytest.mark.long
 def test_a_cube_that_turns_is_where_it_should_be_up_to_its_first_bounce(opened):
     tab = opened()
     worst, bounced = 0.0, 0
-    for seed in range(20):
+    for seed in range(8):
         scene = random_scene(np.random.default_rng(seed), spin=2.0)
         state = simulate(scene, model="tumbling", steps=STEPS, every=1).trajectory.state
         told = in_browser(tab, scene, "tumbling", "position", "nodes", every=1)
@@ -112,7 +112,7 @@ def test_a_cube_that_turns_is_where_it_should_be_up_to_its_first_bounce(opened):
         places, nodes = state["position"][before], state["node_offset"][before].reshape(-1, 24)
         worst = max(worst, np.abs(told["position"][before] - places).max() / scale["position"])
         worst = max(worst, np.abs(told["nodes"][before] - nodes).max() / scale["nodes"])
-    assert bounced > 10
+    assert bounced > 4
     print(f"largest distance before the first bounce: {worst:.2g}")
     assert worst <= 1e-12
 

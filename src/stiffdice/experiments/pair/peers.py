@@ -20,6 +20,8 @@ import xarray as xr
 from stiffdice.dynamics.box_contact import law
 from stiffdice.dynamics.box_contact.overlap import CONTACT, MOST
 from stiffdice.dynamics.box_contact.pair_state import PairPhysics, pair_physics_of, pair_start_of
+from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.contact import Wrench
 from stiffdice.dynamics.state import Array
 from stiffdice.experiments.measuring import coordinates, mapped, numbers, quantity, result, span
 from stiffdice.experiments.pair import threads
@@ -78,25 +80,31 @@ class Ours:
         found = simulate_pair(scene, scheme=OURS, steps=round(scene.duration / h), every=1).trajectory
         assert found is not None
         physics = pair_physics_of(scene)
-        contacts = np.array([_contacts(physics, pair) for pair in found.state[1:]])
+        contacts = np.array([_contact(physics, pair)[1] for pair in found.state[1:]])
         return Rest(contacts, found.state["b"]["position"][1:, 2])
 
     def pushed(self, scene: PairScene) -> Push:
         """Return the force on the second box, its torque, and at how many contacts."""
         physics, (pair,) = pair_physics_of(scene), pair_start_of(scene)
-        on_b = np.array(law.contact_wrenches(physics, pair)[1])
-        return Push(on_b[:3], on_b[3:], _contacts(physics, pair))
+        wrench, contacts = _contact(physics, pair)
+        return Push(np.array(wrench[:3]), np.array(wrench[3:]), contacts)
 
     def depth(self, scene: PairScene) -> float:
         """Return how deep one box is in the other, by the deepest contact [m]."""
         (pair,) = pair_start_of(scene)
-        law.contact_wrenches(pair_physics_of(scene), pair)
+        _contact(pair_physics_of(scene), pair)
         return float(pair["depth"])
 
 
-def _contacts(physics: PairPhysics, pair: Any) -> int:
-    """Return at how many vertices of the boxes' overlap there are springs."""
-    return int(law.overlap(physics, pair, np.empty(2 * MOST, CONTACT))[1].number)
+@njit(cache=True)
+def _contact(physics: PairPhysics, pair: Any) -> tuple[Wrench, int]:
+    """Return force and torque on the second box, and the number of vertices with springs; set how deep the boxes are.
+
+    It is kept on disk, as what it calls is not.
+    """
+    _, on_b = law.contact_wrenches(physics, pair)
+    _, least = law.overlap(physics, pair, np.empty(2 * MOST, CONTACT))
+    return on_b, least.number
 
 
 def _asked(way: str) -> Any:
@@ -189,9 +197,9 @@ def _exit_speed(peer: Any) -> Callable[[float], float]:
 
 def _energy_speed(scene: PairScene) -> float:
     """Return the speed that the energy of two cubes' springs is worth: √(2 U/m_r), m_r their reduced mass [m/s]."""
-    (pair,) = pair_start_of(scene)
+    (energy,), _ = law.evaluate(pair_physics_of(scene), pair_start_of(scene))
     reduced = 1.0 / sum(1.0 / cube.mass for cube in scene.cubes)
-    return math.sqrt(2 * law.elastic_energy(pair_physics_of(scene), pair) / reduced)
+    return math.sqrt(2 * float(energy) / reduced)
 
 
 def _push(peer: Any) -> Callable[[str, float], tuple[float, float, float]]:

@@ -47,7 +47,7 @@ def test_each_method_has_its_line_if_it_was_asked(found):
     np.testing.assert_allclose(lines_of(depth)["corner in corner"][:, 0], [1.0, 0.5])
 
 
-@pytest.mark.long
+@pytest.mark.broad
 def test_the_same_data_give_the_same_files(found, tmp_path):
     check_equal_files("pair-peers", {"peers": found}, tmp_path)
 
