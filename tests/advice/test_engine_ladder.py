@@ -33,15 +33,15 @@ def test_mujoco_bounces_as_predicted_at_every_timestep(restitution):
         assert measured == pytest.approx(predicted, rel=1e-5)
 
 
-@pytest.fixture(scope="module")
-def lively():
-    """The ladder of an engine on a contact of restitution 0.9, climbed once."""
-    return cache(lambda engine: climbed(engine, contact(0.9)))
+@cache
+def lively(engine):
+    """Return the ladder of an engine on a contact of restitution 0.9."""
+    return climbed(engine, contact(0.9))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["pybullet", "drake"])
-def test_less_damping_makes_up_for_implicit_steps(engine, lively):
+def test_less_damping_makes_up_for_implicit_steps(engine):
     pytest.importorskip({"drake": "pydrake"}.get(engine, engine))
     wanted, ladder = contact(0.9), lively(engine)
     plain, less = (
@@ -53,7 +53,7 @@ def test_less_damping_makes_up_for_implicit_steps(engine, lively):
 
 
 @pytest.mark.long
-def test_bullets_own_restitution_is_not_what_a_box_has(lively):
+def test_bullets_own_restitution_is_not_what_a_box_has():
     pytest.importorskip("pybullet")
     assert lively("pybullet").longest(Column(engine_ladder.RESTITUTION, "measured"), "restitution_5", 0.9) is None
 

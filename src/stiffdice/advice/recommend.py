@@ -72,8 +72,8 @@ def advise(
     scene: the problem. error [radii]: root mean square distance between the cube's centre and its exact path, over
     the time to the horizon, in radii of the cube. horizon [s]: until when the error is to hold; None is the scene's
     duration. scheme: advice for this one alone. patience: force evaluations of the longest pilot run. budget: steps
-    that a run of fixed steps may compute one by one. tell: called with the name of what is tried
-    next, and the part of the time that is over then.
+    that a run of fixed steps may compute one by one. tell: called with the name of what is tried next, and the part
+    of the time that is over then.
 
     Raises InputError for an unknown name, a number out of range, and a scene of which no path can be computed.
     """
@@ -93,9 +93,9 @@ def advise(
     small = [off for _, off in ladder if pilot.floor[-1] < off[-1] <= LINEAR]
     shape = max(small, key=lambda off: off[-1], default=pilot.floor)  # the largest error that grows as small ones do
     search = Search(pilot, linear_stability.hardest(pilot.scene, pilot.model), shape, budget)
-    names = [name for name in schemes.SCHEMES if not schemes.unfit(name, pilot.scene, pilot.model)]
+    names = [scheme] if scheme else [s for s in schemes.SCHEMES if not schemes.unfit(s, pilot.scene, pilot.model)]
     options = []
-    for number, name in enumerate(names if scheme is None else [scheme]):
+    for number, name in enumerate(names):
         tell(name, _LADDER + (1 - _LADDER) * number / len(names))
         options.append(_own(pilot, name, ladder, error, patience) if name in _OWN else search.option(name, error))
     options.sort(key=lambda option: (not option.keeps, option.seconds))

@@ -92,7 +92,7 @@ class Notes:
 
     def __init__(self, what: str) -> None:
         self._what = self._text = what
-        self._line, self._left, self._next_time, self._has_compiled = _Line(), _Left(), 0.0, False
+        self._line, self._left, self._next_time = _Line(), _Left(), 0.0
         self._timer = threading.Timer(QUIET_SECONDS, lambda: self._line.say(f"{self._text} ..."))
         self._timer.daemon = True
 
@@ -111,10 +111,8 @@ class Notes:
             self._line.say(f"{self._text}: {left.strip()}")
 
     def compiles(self) -> None:
-        """Say that kernels are compiled, the first time."""
-        if not self._has_compiled:
-            self._has_compiled = True
-            self._line.say(f"{self._text}: compiling kernels, once")
+        """Say that kernels are compiled."""
+        self._line.say(f"{self._text}: compiling kernels, once")
 
     def __enter__(self) -> Self:
         self._timer.start()
@@ -135,5 +133,5 @@ def trials(what: str) -> Iterator[Notes]:
     """Give what says what a block simulates, that it compiles included."""
     from stiffdice.dynamics.compiling.kernel_cache import telling
 
-    with Notes(what) as told, telling(told.compiles):
+    with Notes(what) as told, telling(cache(told.compiles)):
         yield told

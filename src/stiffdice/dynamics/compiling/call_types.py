@@ -18,12 +18,12 @@ _FOUND: dict[tuple[Any, ...], Any] = {}
 def _get_call_type(function: Any, context: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """Return the signature of a call; found anew where numba has to compile what is called, as options change that."""
     call = function, context, tuple(arguments)
-    if named or call not in _FOUND:
-        signature = _find(function, context, arguments, named)
-        if named or function.get_impl_key(signature) != function.typing_key:
-            return signature
+    if not named and call in _FOUND:
+        return _FOUND[call]
+    signature = _find(function, context, arguments, named)
+    if not named and function.get_impl_key(signature) == function.typing_key:
         _FOUND[call] = signature
-    return _FOUND[call]
+    return signature
 
 
 def remember() -> None:

@@ -63,7 +63,6 @@ def summary_of(
     return Summary(tosses, unit, tracker_of(tosses, scene.gravity), len(fitted), best, physics, kept, found)
 
 
-_FIT = 0.85  # of the time
-
 # Errors against reality are known to a hundredth at these steps.
 _OMEGA_H = 0.1
+_FIT = 0.85  # part of the time that the fit takes
