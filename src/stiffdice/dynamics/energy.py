@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.compilation import njit, separate
 from stiffdice.dynamics.contact import height_of, normal_of
 from stiffdice.dynamics.inertia import turning_energy
 from stiffdice.dynamics.models import registry as models
@@ -26,7 +26,7 @@ def kinetic(physics: Physics, state: Any) -> float:
     return _moving(physics, state, vector(state.velocity), vector(state.angular_momentum))
 
 
-@njit
+@separate("float64")
 def kinetic_at_place(model: Any, physics: Physics, state: Any, lag_time: float) -> float:
     """Return the kinetic energy [J] at the time of the place, where the velocities are those of `lag_time` [s] before.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from stiffdice.dynamics import model_selection
 from stiffdice.dynamics.compilation import compile_together, njit, separate
-from stiffdice.dynamics.energy import energies, energies_at_places, fill_energies
+from stiffdice.dynamics.energy import energies, energies_at_places, fill_energies, kinetic_at_place
 from stiffdice.dynamics.state import Array, Ensemble, States, start_of
 from stiffdice.errors import InputError
 from stiffdice.integrators import registry as schemes
@@ -191,11 +191,13 @@ def _compile(task: Task, leaping: bool) -> None:
     system, members = task.system, task.members
     batched = batch_loop.march_of(task) if leaping else None
     member = Member(members.ensemble[0], members.sight[0], members.memory[0], members.references[0])
-    march = [batched] if batched else [(_observed, (system, member, 0, 0)), (_march, _arguments(task, leaping))]
+    moving = kinetic_at_place, (*system, member.state, 0.0)
+    march = (_march, _arguments(task, leaping))
+    stepping = (batched, moving) if batched else ((_observed, (system, member, 0, 0)), moving, march)
     watch = (criteria_start, (system, members)), (finish, (system.physics, members))
     states = members.samples
     keep = fill_energies, (*system, states, 0.0, np.empty((4, 0)))
-    compile_together(*march, *watch, *([keep] if task.limits.every else ()))
+    compile_together(*stepping, *watch, *([keep] if task.limits.every else ()))
 
 
 def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:

@@ -32,7 +32,7 @@ def compile_together(calls: _Due) -> None:
     """
     due = [(kernel, signature) for kernel, given in calls if (signature := _not_stored(kernel, given)) is not None]
     with _another(due) if len(due) > 1 and _can_fork() else contextlib.nullcontext():
-        _compile_the_free(due[::-1])
+        _compile_the_free(due)
         for kernel, signature in due:
             kernel.compile(signature)  # waits for those that the other has begun
 
