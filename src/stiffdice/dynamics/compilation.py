@@ -41,16 +41,16 @@ class Compiled:
 
 
 class Intrinsic:
-    """A function for compiled code only that writes LLVM's. module: returns its module, once compiled code calls it."""
+    """A function for compiled code only that writes LLVM's: that of this name in `lanes.py`."""
 
-    def __init__(self, module: Callable[[], Any], name: str) -> None:
-        self._module, self._name = module, name
+    def __init__(self, name: str) -> None:
+        self._name = name
 
     @property
     def _numba_type_(self) -> Any:
         from stiffdice.dynamics.compiling import compiler
 
-        return compiler.type_of(getattr(self._module(), self._name))
+        return compiler.type_of(self._name)
 
 
 def compile_together(*calls: tuple[Compiled, tuple[Any, ...]]) -> None:
@@ -102,16 +102,10 @@ def by_tag(bodies: dict[type, Any], *, inlined: bool = False) -> Any:
     return Compiled(call, bodies, {"forceinline": inlined})
 
 
-def _lanes() -> Any:
-    from stiffdice.dynamics import lanes
-
-    return lanes
-
-
 # Numbers of several members side by side, in compiled code; `lanes.py` says what there is of them. load(array, row,
 # width): a row of an array of doubles, shape (row, width). store(array, row, value): keep lanes there. where(mask, yes,
 # no): `yes` in the lanes of the mask and `no` in the others. bits(mask): a whole number, lane k its bit k.
-load: Any = Intrinsic(_lanes, "load")
-store: Any = Intrinsic(_lanes, "store")
-where: Any = Intrinsic(_lanes, "where")
-bits: Any = Intrinsic(_lanes, "bits")
+load: Any = Intrinsic("load")
+store: Any = Intrinsic("store")
+where: Any = Intrinsic("where")
+bits: Any = Intrinsic("bits")

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.compilation import bits, njit, store, where
+from stiffdice.dynamics.compilation import bits, njit, separate, store, where
 from stiffdice.dynamics.contact import swing_square
 from stiffdice.dynamics.models import registry as models
 from stiffdice.dynamics.state import TOUCHING, Array, States
@@ -165,7 +165,7 @@ def _come_out(common: Common, axes: Array, block: Array, lane: int, member: Memb
     return step
 
 
-@njit
+@separate("Tuple((int64, int64, boolean))")
 def _fast_forward(common: Common, member: Member, samples: States, done: int, left: int) -> tuple[int, int, bool]:
     """Take at once what can be; return the steps done, those to take in a lane, 0 at the end, and if any were taken."""
     scheme, system, limits, moved = common.scheme, common.system, common.limits, False

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stiffdice.dynamics import model_selection
-from stiffdice.dynamics.compilation import compile_together, njit, separate
+from stiffdice.dynamics.compilation import compile_together, njit
 from stiffdice.dynamics.energy import energies, energies_at_places, fill_energies, kinetic_at_place
 from stiffdice.dynamics.state import Array, Ensemble, States, start_of
 from stiffdice.errors import InputError
@@ -191,13 +191,12 @@ def _compile(task: Task, leaping: bool) -> None:
     system, members = task.system, task.members
     batched = batch_loop.march_of(task) if leaping else None
     member = Member(members.ensemble[0], members.sight[0], members.memory[0], members.references[0])
-    moving = kinetic_at_place, (*system, member.state, 0.0)
-    march = (_march, _arguments(task, leaping))
-    stepping = (batched, moving) if batched else ((_observed, (system, member, 0, 0)), moving, march)
+    called = (observe, (system, member, 0, 0)), (kinetic_at_place, (*system, member.state, 0.0))
+    march = (batched, *called) if batched else (*called, (_march, _arguments(task, leaping)))
     watch = (criteria_start, (system, members)), (finish, (system.physics, members))
     states = members.samples
     keep = fill_energies, (*system, states, 0.0, np.empty((4, 0)))
-    compile_together(*stepping, *watch, *([keep] if task.limits.every else ()))
+    compile_together(*march, *watch, *([keep] if task.limits.every else ()))
 
 
 def _advance(task: Task, leaping: bool, progress: Callable[[float], None] | None) -> None:
@@ -297,7 +296,7 @@ def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: 
                 continue
             if taken == 0:
                 break
-            undecided -= _observed(system, member, done + taken, flown)
+            undecided -= observe(system, member, done + taken, flown)
             if memory.finite[0] > 0.0:
                 done = done + taken - 1 if computed > 0 else done
                 break
@@ -307,11 +306,6 @@ def _march(scheme: Any, system: System, members: Members, limits: Limits, leap: 
                 kept = until_kept(limits, done)
         members.steps_done[m] = done
     return False
-
-
-@separate("int64")
-def _observed(system: System, member: Member, step: int, flown: int) -> int:
-    return observe(system, member, step, flown)
 
 
 @njit

@@ -9,14 +9,15 @@ import sys
 import pytest
 
 OWN = """
+import os
 import sys
 from stiffdice.dynamics.compilation import njit, separate
 from stiffdice.dynamics.compiling import kernel_files, parallel_compilation
 
-store = kernel_files.KernelFiles.save
+store, first = kernel_files.KernelFiles.save, os.getpid()
 
 def save(self, key, kernel):
-    print("stored", self._name.partition("-")[0], flush=True)
+    print("stored", "here" if os.getpid() == first else "elsewhere", self._name.partition("-")[0], flush=True)
     store(self, key, kernel)
 
 kernel_files.KernelFiles.save = save
@@ -34,10 +35,20 @@ def sum_of_thirds(x, y):
 def twice_a_third(x):
     return 2.0 * third(x)
 
+@separate("float64")
+def ninth(x):
+    return third(third(x))
+
+@njit(cache=True)
+def a_third_and_a_ninth(x):
+    return third(x) + ninth(x)
+
 if "one" in sys.argv:
     print(sum_of_thirds(1.0, 2.0))
 if "other" in sys.argv:
     print(twice_a_third(1.5))
+if "both" in sys.argv:
+    print(a_third_and_a_ninth(2.25))
 if "itself" in sys.argv:
     print(third(1.5))
 """
@@ -70,6 +81,13 @@ def test_it_is_compiled_once_for_all_that_call_it(call, process):
     other = call("other", process)
     assert other[-1] == "1.0" and stored(other) == ["twice_a_third"]
     assert call("one", "other", process) == ["1.0", "1.0"]
+
+
+@pytest.mark.long
+def test_one_that_calls_another_is_compiled_beside_its_caller_too(call):
+    lines = call("both", "fork")
+    assert lines[-1] == "1.0" and stored(lines) == ["a_third_and_a_ninth", "ninth", "third"]
+    assert [line.rpartition(".")[2] for line in lines if line.startswith("stored here")] == ["a_third_and_a_ninth"]
 
 
 @pytest.mark.long

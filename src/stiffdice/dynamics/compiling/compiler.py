@@ -27,6 +27,8 @@ from numba.core import (
 )
 from numba.np import linalg
 
+# Before numba compiles anything: in a function that it has begun with, `abs` would not know of lanes.
+from stiffdice.dynamics import lanes
 from stiffdice.dynamics.compiling import call_types
 from stiffdice.dynamics.compiling.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder, only_stored
 from stiffdice.dynamics.compiling.kernel_files import KernelCache
@@ -252,9 +254,7 @@ def dispatcher_of(function: Callable[..., Any], bodies: dict[type, Any] | None, 
     return part
 
 
-def type_of(intrinsic: Any) -> Any:
-    """Return numba's type of an intrinsic that has just been imported."""
+def type_of(intrinsic: str) -> Any:
+    """Return numba's type of a function of `lanes.py`."""
     target: Any = registry.cpu_target
-    target.typing_context.refresh()
-    target.target_context.refresh()
-    return target.typing_context.resolve_value_type(intrinsic)
+    return target.typing_context.resolve_value_type(getattr(lanes, intrinsic))

@@ -33,7 +33,7 @@ class Call:
     def __init__(self, kernel: Any, arguments: tuple[Any, ...], symbol: str) -> None:
         self.kernel, self.arguments, self.entry = kernel, arguments, object()
         self.name = kernel.py_func.__module__, kernel.py_func.__name__, arguments
-        self._symbol, self._is_linked, self._child = symbol, False, 0
+        self._symbol, self._is_linked, self._child, self._parent = symbol, False, 0, 0
         described = _Descriptor(
             *(True, *self.name[:2], symbol, "", None, kernel.returns, None),
             *(inspect.signature(kernel.py_func).parameters, ()),
@@ -61,6 +61,7 @@ class Call:
                 self.kernel.compile(self.arguments)
                 return
             self._child = parallel_compilation.begin(lambda: self.kernel.compile_unless_begun(self.arguments))
+            self._parent = os.getpid()
 
     def link(self) -> None:
         """Have the symbol be the kernel's address, once that is compiled; raises TypeError for another type than told.
@@ -76,7 +77,7 @@ class Call:
                 raise TypeError(f"{self.name[1]} returns {made.signature.return_type}, not {self.kernel.returns}")
             binding.add_symbol(self._symbol, made.library.get_pointer_to_function(made.fndesc.llvm_func_name))
             self._is_linked = True
-        if self._child:
+        if self._child and self._parent == os.getpid():  # a process forked since has no such child
             os.waitpid(self._child, 0)
             self._child = 0
 

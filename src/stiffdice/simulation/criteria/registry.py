@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from stiffdice.dynamics.compilation import njit
+from stiffdice.dynamics.compilation import njit, separate
 from stiffdice.dynamics.state import TURNING, Array, Physics
 from stiffdice.errors import InputError
 from stiffdice.simulation import monitor
@@ -133,7 +133,7 @@ def start(system: System, members: Members) -> None:
         _start(members.memory[m], sight, system, state)
 
 
-@njit
+@separate("int64")
 def observe(system: System, member: Member, step: int, flown: int) -> int:
     """Show a member's state after a step to monitor and criteria; return how many that have a limit this decides.
 
