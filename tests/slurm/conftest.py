@@ -34,12 +34,8 @@ SWEEP = rounds.asked_in_parts(
 STUDY = {"question": "Is anything lost?", "sweeps": {"steps": SWEEP}}
 A_MOMENT = 0.5  # seconds in which a file that has its name is laid out, too; a shard takes some
 # Looks at the queue come fast, so that tests do not wait for them; all else is the profile's.
-FAST = {
-    "seconds-between-status-checks": 1,
-    "max-status-checks-per-second": 1,
-    "slurm-init-seconds-before-status-checks": 1,
-    "latency-wait": 5,
-}
+EVERY_SECOND = Path(__file__).parent / "every_second.py"
+FAST = {"max-status-checks-per-second": 1, "latency-wait": 5}
 
 
 class Project:
@@ -57,7 +53,7 @@ class Project:
     def start(self, profile: str = "slurm", *arguments: str) -> Run:
         fast = [f"--{name}={value}" for name, value in FAST.items()] if profile == "slurm" else ["--cores=2"]
         command = ["--workflow-profile", f"workflow/profiles/{profile}", "study", *fast, *arguments]
-        return Run(self, [sys.executable, "-m", "snakemake", *command, "--config", "study=small"])
+        return Run(self, [sys.executable, str(EVERY_SECOND), *command, "--config", "study=small"])
 
     def data(self) -> dict[str, bytes]:
         """Return all files of the study by name, hidden ones included, but what differs between two rebuilds."""

@@ -12,7 +12,7 @@ import pytest
 from tests.slurm.cluster import Cluster, run, send, until
 from tests.slurm.conftest import Project, Run
 
-AWAY = 20.0  # seconds that the controller is gone
+AWAY = 12.0  # seconds that the controller is gone: longer than the time-outs of cluster.py
 # Where it is the shards that are disturbed, what stands on them would only take its time.
 SHARDS_ONLY = "--until=shard"
 # Measured alone on its node; small, as is all that is timed here.
