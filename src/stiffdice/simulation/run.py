@@ -192,6 +192,7 @@ def _compile(task: Task, leaping: bool) -> None:
     batched = batch_loop.march_of(task) if leaping else None
     member = Member(members.ensemble[0], members.sight[0], members.memory[0], members.references[0])
     called = (observe, (system, member, 0, 0)), (kinetic_at_place, (*system, member.state, 0.0))
+    # The process that compiles the kinetic energy, and with it the force, takes `_march` next, which has that, too.
     march = (batched, *called) if batched else (*called, (_march, _arguments(task, leaping)))
     watch = (criteria_start, (system, members)), (finish, (system.physics, members))
     states = members.samples

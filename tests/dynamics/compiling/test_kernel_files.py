@@ -260,7 +260,7 @@ print(float(run.trajectory.state["position"][-1, 2]).hex())
     ("what", "count"),
     [
         pytest.param(ENERGY, 1, marks=pytest.mark.long),
-        pytest.param(RUN, 5, marks=pytest.mark.broad),
+        pytest.param(RUN, 6, marks=pytest.mark.broad),
     ],
     ids=["kernel", "run"],
 )

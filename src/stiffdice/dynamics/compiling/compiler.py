@@ -32,7 +32,8 @@ from stiffdice.dynamics import lanes
 from stiffdice.dynamics.compiling import call_types
 from stiffdice.dynamics.compiling.kernel_cache import LOADING, TELLING, NotStoredError, cache_folder, only_stored
 from stiffdice.dynamics.compiling.kernel_files import KernelCache
-from stiffdice.dynamics.compiling.separate_kernels import Call, KernelLibrary, Library
+from stiffdice.dynamics.compiling.llvm_library import Library
+from stiffdice.dynamics.compiling.separate_kernels import Call, KernelLibrary
 
 # Numba imports SciPy to see whether it can multiply matrices, which our kernels do not; it looks again when one does.
 _ensure_blas, vars(linalg)["ensure_blas"] = vars(linalg)["ensure_blas"], lambda: None

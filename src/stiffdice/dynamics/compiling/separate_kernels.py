@@ -13,13 +13,13 @@ import os
 from typing import Any, cast
 
 from llvmlite import binding
-from numba.core import codegen, funcdesc
+from numba.core import funcdesc
 
 from stiffdice.dynamics.compiling import parallel_compilation
 from stiffdice.dynamics.compiling.kernel_cache import NotStoredError, only_stored
+from stiffdice.dynamics.compiling.llvm_library import Library
 
-# Of these numba has no types.
-_Library: Any = codegen.JITCodeLibrary
+# Numba has no types of it.
 _Descriptor: Any = funcdesc.FunctionDescriptor
 
 
@@ -84,17 +84,6 @@ class Call:
 
 _CALLS: dict[str, Call] = {}
 _NOWHERE = 1 << 12
-
-
-class Library(_Library):  # type: ignore[misc]
-    """LLVM code. Numba would begin to optimise what a module only declares, too, many more functions than it has."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-        for function in ll_module.functions:
-            if not function.is_declaration:
-                passes, builder = self._codegen._function_pass_manager()
-                passes.run(function, builder)
 
 
 class KernelLibrary(Library):
