@@ -11,6 +11,7 @@ import pytest
 OWN = """
 import os
 import sys
+import numba
 from stiffdice.dynamics.compilation import njit, separate
 from stiffdice.dynamics.compiling import kernel_files, parallel_compilation
 
@@ -43,6 +44,10 @@ def ninth(x):
 def a_third_and_a_ninth(x):
     return third(x) + ninth(x)
 
+@njit
+def part(x):
+    return third(x)
+
 if "one" in sys.argv:
     print(sum_of_thirds(1.0, 2.0))
 if "other" in sys.argv:
@@ -51,6 +56,10 @@ if "both" in sys.argv:
     print(a_third_and_a_ninth(2.25))
 if "itself" in sys.argv:
     print(third(1.5))
+if "part" in sys.argv:
+    print(part(1.5))
+if "numba" in sys.argv:
+    print(numba.njit(lambda x: third(x))(1.5))
 """
 
 
@@ -107,3 +116,13 @@ def test_what_returns_another_type_than_its_callers_were_told_is_refused(call):
 @pytest.mark.long
 def test_python_may_call_it(call):
     assert call("itself")[-1] == "0.5"
+
+
+@pytest.mark.long
+def test_python_may_call_a_part_that_calls_it(call):
+    assert call("part")[-1] == "0.5"
+
+
+@pytest.mark.long
+def test_code_that_numba_compiles_for_itself_ends_with_a_sentence(call):
+    assert call("numba")[-1].endswith("compile that with `compilation.njit`")

@@ -221,7 +221,8 @@ def _callable(part: _Part) -> Any:
     def call(*arguments: Any) -> Any:
         return part(*arguments)
 
-    return numba.njit(call, error_model="numpy", fastmath=False)
+    options = {"error_model": "numpy", "fastmath": False, "nopython": True}
+    return _Dispatcher(call, targetoptions=options, pipeline_class=_KernelCompiler)
 
 
 class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]

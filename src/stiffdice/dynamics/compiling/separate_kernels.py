@@ -7,6 +7,7 @@ is compiled for itself, at the same time as the others, in another process.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import inspect
 import os
@@ -41,6 +42,7 @@ class Call:
             argtypes=arguments,
         )
         kernel.targetctx.insert_user_function(self.entry, described)
+        binding.add_symbol(symbol, cast(int, ctypes.cast(_not_linked, ctypes.c_void_p).value))
         _CALLS[symbol] = self
 
     @classmethod
@@ -66,11 +68,9 @@ class Call:
     def link(self) -> None:
         """Have the symbol be the kernel's address, once that is compiled; raises TypeError for another type than told.
 
-        In a process that only stores what it compiles, and calls nothing, it is any address.
+        In a process that only stores what it compiles, and calls nothing, it may be any address.
         """
-        if parallel_compilation.STORING.get():
-            binding.add_symbol(self._symbol, _NOWHERE)
-        elif not self._is_linked:
+        if not self._is_linked and not parallel_compilation.STORING.get():
             self.kernel.compile(self.arguments)
             made = self.kernel.overloads[self.arguments]
             if made.signature.return_type != self.kernel.returns:
@@ -83,7 +83,14 @@ class Call:
 
 
 _CALLS: dict[str, Call] = {}
-_NOWHERE = 1 << 12
+
+
+@ctypes.CFUNCTYPE(None)
+def _not_linked() -> None:
+    """End the process with a sentence, where it would jump to nowhere."""
+    told = "a separate kernel was called by code that numba compiled for itself; compile that with `compilation.njit`"
+    os.write(2, f"{told}\n".encode())
+    os.abort()
 
 
 class KernelLibrary(Library):
