@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 
-_NUMBER = r"[\d.,]+(?:×10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+-]?\d+)?"
+_NUMBER = r"[\d.,]+(?:(?:×10)?[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|e[+-]?\d+)?"
 _TIME = rf"{_NUMBER} (?:ns|µs|ms|s|min|h|days|years)\b"
 # What differs from one machine, day or run to another.
 NORMALISATIONS = [
@@ -20,7 +20,7 @@ NORMALISATIONS = [
     (r"\b(mujoco|drake|dart|pybullet) \d+\.\d+(\.\d+)?", r"\1 VERSION"),
     # Round-off, which follows the processor's instructions.
     (r"[-+−]?\d(\.\d+)?e-(0[89]|[1-9]\d)\b", "ROUNDOFF"),
-    (r"[-+−]?\d(\.\d+)?×10⁻(?:[⁸⁹]|[¹²³]\S)", "ROUNDOFF"),
+    (r"[-+−]?(?:\d(\.\d+)?×)?10⁻(?:[⁸⁹]|[¹²³]\S)", "ROUNDOFF"),
     (r"(?m)[ \t]+$", ""),
     (r"(?<=\S) {2,}", " "),  # columns are as wide as their numbers
 ]

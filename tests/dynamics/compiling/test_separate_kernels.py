@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import pytest
 
 OWN = """
@@ -64,15 +60,11 @@ if "numba" in sys.argv:
 
 
 @pytest.fixture
-def call(tmp_path):
+def call(run_script):
     """Return what lines a new process prints that calls kernels."""
 
     def called(*what, returns="float64"):
-        script = tmp_path / "own.py"
-        script.write_text(OWN.format(returns=returns))
-        places = {"NUMBA_CACHE_DIR": str(tmp_path / "kernels"), "PYTHONPATH": os.pathsep.join(sys.path)}
-        command = [sys.executable, str(script), *what]
-        done = subprocess.run(command, env=os.environ | places, capture_output=True, text=True, check=False)
+        done = run_script(OWN.format(returns=returns), *what)
         return done.stdout.splitlines() if done.returncode == 0 else [done.stderr.splitlines()[-1]]
 
     return called
