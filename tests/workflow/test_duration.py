@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from tests import forks
 from tests.workflow.test_workflow import ROOT
 
 from stiffdice.study import config as studies
@@ -129,14 +129,24 @@ def test_a_job_that_takes_longer_than_foreseen_is_told_as_such(duration, study):
     assert told.left()[0] == "quick: 0 of 1 jobs done, what is left takes longer than foreseen"
 
 
-def test_while_it_runs_it_says_so_now_and_then(duration, study, monkeypatch, capsys):
-    for name in ("OFTEN", "SELDOM"):
-        monkeypatch.setattr(duration, name, 0.05)
-    duration.Duration({"quick": study}, due(study), 2).tell()
-    time.sleep(0.5)
-    monkeypatch.setattr(duration, "SELDOM", 1e6)
-    monkeypatch.setattr(duration, "OFTEN", 1e6)
-    first, *rest = capsys.readouterr().err.splitlines()
+# In a process of its own: who tells goes on as long as that lives.
+TELLING = """
+import os, sys, time
+sys.path.insert(0, "workflow")
+import duration
+from stiffdice.study import config, outputs
+duration.OFTEN = duration.SELDOM = 0.05
+duration.forecast.crowding = lambda cores: 1.0
+study = config.load("config/quick.yaml")
+os.chdir(sys.argv[1])
+duration.Duration({"quick": study}, {f"results/quick/{result.benchmark}" for result in outputs.of(study)}, 2).tell()
+time.sleep(0.5)
+"""
+
+
+def test_while_it_runs_it_says_so_now_and_then(tmp_path):
+    done = forks.run_code(TELLING, str(tmp_path), cwd=ROOT)
+    first, *rest = done.stderr.splitlines()
     assert re.fullmatch(r"stiffdice: quick: 13 jobs, about \d+ s on 2 cores", first)
     assert 2 <= len(rest) <= 12
     assert all(re.fullmatch(r"stiffdice: quick: 0 of 13 jobs done, about \d+ s left", line) for line in rest)
