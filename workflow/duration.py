@@ -29,13 +29,14 @@ class Duration:
         self._cores, self._begun = cores, time.time()
         self._crowding = forecast.crowding(cores)
         slowness = forecast.slowness()
-        self._expected: dict[tuple[Path, Result], float] = {}
+        self._expected: dict[tuple[Path, Result], tuple[str, float]] = {}
         for name, study in studies.items():
             folder = Path("results", name)
             for result, seconds in forecast.seconds(study).items():
                 if (folder / result.benchmark).as_posix() in due:
                     before = job_log.took(folder / result.benchmark) if result.stage in MEASURING else None
-                    self._expected[folder, result] = before or seconds * slowness
+                    expected = forecast.kind_of(study, result), before or seconds * slowness
+                    self._expected[folder, result] = expected
         self._name = ", ".join(studies)
 
     def told(self) -> str:
@@ -71,17 +72,17 @@ class Duration:
             _say(line)
 
     def _jobs(self) -> list[Job]:
-        return [self._job(folder, result, weight) for (folder, result), weight in self._expected.items()]
+        return [self._job(*place, *expected) for place, expected in self._expected.items()]
 
-    def _job(self, folder: Path, result: Result, weight: float) -> Job:
+    def _job(self, folder: Path, result: Result, kind: str, weight: float) -> Job:
         """Return what is known of a job so far: nothing of an earlier run's."""
         told = job_log.read(folder / result.log)
         if told is None or told.begun is None or told.begun.timestamp() < self._begun - 1:  # told in whole seconds
             told = None
         if told is None or not told.ending:
-            return Job(result, weight, None, True, told)
+            return Job(kind, weight, None, True, told)
         took = (told.written - told.begun).total_seconds() if told.ending == "done" else None
-        return Job(result, weight, took, False)
+        return Job(kind, weight, took, False)
 
 
 def _say(line: str) -> None:

@@ -10,7 +10,6 @@ from stiffdice.simulation import batch_loop
 from stiffdice.study import catalogue, forecast, job_log, outputs
 from stiffdice.study import config as studies
 from stiffdice.study.forecast import Job
-from stiffdice.study.outputs import Result
 from stiffdice.sweep import partition
 
 
@@ -64,6 +63,24 @@ def test_no_measure_is_forgotten():
     assert set(catalogue.TIMINGS) <= set(forecast._TIMING)
 
 
+@pytest.mark.usefixtures("compiled")
+def test_experiments_with_more_throws_take_longer(load):
+    study = load("landing")
+    found = {result.name: seconds for result, seconds in forecast.seconds(study).items()}
+    throws = {name: each.options["throws"] for name, each in study.experiments.items() if each.measure == "landing"}
+    start = 0.42
+    assert {name: (found[name] - start) / throws[name] for name in throws} == pytest.approx(dict.fromkeys(throws, 1e-4))
+    kinds = {forecast.kind_of(study, result) for result in outputs.of(study)}
+    assert kinds == {"experiment landing", "experiment coarse-steps", "figure"}
+
+
+@pytest.mark.parametrize("throws", ["many", -1, 0, None, 2.5])
+def test_a_number_of_throws_that_is_none_is_for_the_experiment_to_refuse(load, throws):
+    study = load("landing")
+    study.experiments["fair"].options["throws"] = throws
+    assert all(seconds > 0 for seconds in forecast.seconds(study).values())
+
+
 def test_a_hundredth_of_a_second_tells_how_fast_this_machine_is():
     forecast.slowness()
     begun = time.process_time()
@@ -78,12 +95,12 @@ def test_jobs_beside_others_take_longer():
     assert forecast.crowding(10_000) < 1.1
 
 
-def done(stage, weight, took):
-    return Job(Result(stage, "one", ()), weight, took, due=False)
+def done(kind, weight, took):
+    return Job(kind, weight, took, due=False)
 
 
-def due(stage, weight=1.0, took=None, log=None):
-    return Job(Result(stage, "one", ()), weight, took, due=True, log=log)
+def due(kind, weight=1.0, took=None, log=None):
+    return Job(kind, weight, took, due=True, log=log)
 
 
 @pytest.mark.parametrize(
@@ -97,6 +114,7 @@ def due(stage, weight=1.0, took=None, log=None):
         ([done("shard", 1, 1), done("shard", 1, 3), done("shard", 1, 50), due("shard")], 1, 3),  # the median
         ([done("figure", 2, 10), due("shard", 3)], 1, 15),  # as all others, where none of its kind has ended
         ([done("figure", 2, 10), done("shard", 1, 1), due("shard", 3)], 1, 3),
+        ([done("a measure", 2, 10), done("another", 1, 1), due("another", 3)], 1, 3),  # each as its own
         ([due("shard", took=10) for _ in range(4)], 2, 20),
         ([due("shard", took=30), due("shard", took=2)], 8, 30),  # the longest, if there are cores enough
         ([due("shard", took=10), due("timings", took=5), due("timings", took=5)], 2, 20),

@@ -1,6 +1,6 @@
 """Make one experiment or one timing, and store what it found."""
 
-from job import Job, Say, Stopwatch, begin
+from job import Job, Say, Stopwatch, begin, tenths
 
 
 def make(job: Job, say: Say) -> None:
@@ -9,13 +9,14 @@ def make(job: Job, say: Say) -> None:
     from stiffdice.io.writer import write_dataset
     from stiffdice.scene import scene as scenes
     from stiffdice.simulation.dataset import config_attributes
+    from stiffdice.simulation.progress import told_to
     from stiffdice.study.catalogue import EXPERIMENTS, TIMINGS
 
     kind, planned = "timing" if "timing" in job.wildcards else "experiment", job.plan()
     scene = scenes.load(planned.scene, planned.changes)
     measure = {"experiment": EXPERIMENTS, "timing": TIMINGS}[kind][planned.measure].load()
     watch = Stopwatch()
-    with watch.running():
+    with watch.running(), told_to(tenths(say)):
         try:
             found = measure(scene, **planned.options)
         except InputError as error:

@@ -77,6 +77,7 @@ def call(options: argparse.Namespace) -> None:
 
     from stiffdice.cli.terminal.progress import notes, progress, trials
     from stiffdice.experiments.dice import throws
+    from stiffdice.simulation.progress import told_to
 
     steps = throws.default_steps(scene) if options.steps is None else common.whole("--steps", options.steps)
     if count == 1:
@@ -87,8 +88,8 @@ def call(options: argparse.Namespace) -> None:
             with notes("throw: drawing"):
                 _animate(thrown, target)
         return
-    with progress("") as show:
-        many = throws.many(scene, launches, options.scheme, steps, count, progress=show)
+    with progress("") as show, told_to(show):
+        many = throws.many(scene, launches, options.scheme, steps, count)
     _show(options, throws.told_of_many(many), many.as_mapping())
 
 

@@ -15,7 +15,7 @@ from stiffdice.errors import InputError
 from stiffdice.io.cf_enums import enum_attributes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
-from stiffdice.simulation import dataset
+from stiffdice.simulation import dataset, progress
 from stiffdice.simulation.run import Run
 
 # What xarray takes for a variable: dimensions, values, attributes.
@@ -167,7 +167,8 @@ def mapped(
     """
     lists = {name: list(values) for name, values in axes.items()}
     variables = coordinates(**lists)
-    columns = zip(*(function(*place) for place in itertools.product(*lists.values())), strict=True)
+    places = progress.each([*itertools.product(*lists.values())])
+    columns = zip(*(function(*place) for place in places), strict=True)
     for (name, (meaning, unit, *inner)), column in zip(described.items(), columns, strict=True):
         data = np.array(column)
         shape = *map(len, lists.values()), *data.shape[1:]

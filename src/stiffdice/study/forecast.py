@@ -41,7 +41,7 @@ _EXPERIMENT = {
     **{"model-ablation": 5.0, "work-precision": 33.0, "engine-contact": 2.0, "engine-limits": 2.6, "engine-throw": 6.5},
     **{"pair-limits": 28.0, "pair-outcomes": 35.0, "pair-orders": 8.0},
     **{"granular-steps": 3.0, "granular-impacts": 0.1, "granular-beads": 0.2},
-    **{"landing": 60.0, "coarse-steps": 300.0},
+    **{"landing": 20.0, "coarse-steps": 200.0},
     **{"stiffness": 1.0, "damping": 12.5, "friction": 1.0, "mass": 11.5, "radius": 31.0, "spin": 21.5, "start": 1.0},
     **{"box-faces": 120.0, "face-response": 170.0, "launch-response": 130.0, "response-checks": 170.0},
     **{"flat-bounce": 25.0, "sliding-bounce": 21.0, "tumbling-throw": 75.0},
@@ -52,6 +52,9 @@ _TIMING = {
     **{"work-precision": 3.0, "model-ablation": 1.2, "engine-speed": 3.2},
     **{"flat-bounce": 24.0, "sliding-bounce": 17.0, "tumbling-throw": 34.0},
 }
+
+# Of these for so many throws: more take longer by as much.
+_THROWS, _THROWN = 200_000, ("landing", "coarse-steps")
 
 # A later round has that part of the work by which its shards are counted (`shards`), which is a generous guess.
 _LATER = 0.25
@@ -68,11 +71,11 @@ _LOOK = 0.01
 class Job(NamedTuple):
     """What is known of how long the job of a result takes [s].
 
-    weight: jobs of one kind take as long as it says. took: the job, when it last ended well, if it is known. due:
-    whether it is still to be made. log: of a running one.
+    kind: as of `kind_of`; jobs of one kind take as long as their weights say. took: the job, when it last ended well,
+    if it is known. due: whether it is still to be made. log: of a running one.
     """
 
-    result: Result
+    kind: str
     weight: float
     took: float | None
     due: bool
@@ -87,8 +90,8 @@ def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
     has, `pace` [s] for each of its weight.
     """
     known = []
-    for (stage, name, _), weight, took, due, log in jobs:
-        kind, elapsed, whole = f"shard {name.partition('/')[0]}" if stage == "shard" else stage, 0.0, took
+    for kind, weight, took, due, log in jobs:
+        elapsed, whole = 0.0, took
         if log and log.begun:
             elapsed = (datetime.now(UTC) - log.begun).total_seconds()
             if log.progress:
@@ -104,6 +107,16 @@ def left(jobs: Sequence[Job], cores: int, pace: float) -> float:
             expected = rates.get(kind, pace) * weight if whole is None else whole
             (alone if kind == "timings" else shared).append(max(0.0, expected - elapsed))
     return max(sum(shared) / cores, *shared) + sum(alone)
+
+
+def kind_of(study: Study, result: Result) -> str:
+    """Return of what kind the job of a result is: its stage, of which sweep a shard is, what an experiment measures."""
+    match result.stage:
+        case "shard":
+            return f"shard {result.name.partition('/')[0]}"
+        case "experiment":
+            return f"experiment {study.experiments[result.name].measure}"
+    return result.stage
 
 
 def seconds(study: Study) -> dict[Result, float]:
@@ -133,7 +146,9 @@ def _work(study: Study, result: Result) -> tuple[float, set[tuple[str, ...]]]:
             timed = result.stage == "timings"
             asked, table = (study.timings[name], _TIMING) if timed else (study.experiments[name], _EXPERIMENT)
             choice = asked.options.get("axis", asked.options.get("problem"))
-            return table.get(str(choice), table.get(asked.measure, 0.0)), {(result.stage, name)}
+            throws = asked.options.get("throws") if asked.measure in _THROWN else None
+            more = throws / _THROWS if isinstance(throws, int) and throws > 0 else 1.0  # else the experiment will say
+            return table.get(str(choice), table.get(asked.measure, 0.0)) * more, {(result.stage, name)}
         case "figure" if DRAWINGS[study.figures[name].draw].given != "runs":
             return _DRAWING, set()
     return 0.0, set()

@@ -152,7 +152,7 @@ def of(study: Study, folder: Path, cores: int | None = None) -> Status:
     for result, state, _, log in standings:
         due = state is not State.DONE and not (running and result in lost)
         told, took = log if state is State.RUNNING else None, job_log.took(folder / result.benchmark)
-        jobs.append(forecast.Job(result, weights[result], took, due, told))
+        jobs.append(forecast.Job(forecast.kind_of(study, result), weights[result], took, due, told))
     cores = cores or max(1, running)
     return Status(
         study=study,

@@ -10,14 +10,14 @@ beside.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 import xarray as xr
 
-from stiffdice.dynamics.state import Array
 from stiffdice.errors import InputError
 from stiffdice.experiments.dice import counts as counting
 from stiffdice.experiments.dice import throws as throwing
@@ -26,6 +26,7 @@ from stiffdice.experiments.dice.throws import steps_at
 from stiffdice.experiments.measuring import Variable, coordinates, numbers, quantity, result
 from stiffdice.scene import die, validation
 from stiffdice.scene.scene import Scene
+from stiffdice.simulation import progress
 from stiffdice.simulation.landing import BATCHED, MODEL, land
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 
@@ -34,14 +35,8 @@ EVALUATIONS = {"symplectic_euler": 1, "forward_euler": 1, "velocity_verlet": 2, 
 REFERENCE = "event"
 # Output intervals of the reference: a face is looked at this often.
 _INTERVALS = 2000
-
-
-class _Reference(NamedTuple):
-    """Paths of the reference, by launch: the place at rest [m], how far it was thrown [m], the face."""
-
-    place: Array
-    distance: Array
-    face: np.ndarray[tuple[int, ...], np.dtype[np.int8]]
+# Work of a path, which no other is stepped beside and which goes on when its face is known, over that of a throw.
+_DEARER = 80
 
 
 def measure(
@@ -74,8 +69,16 @@ def measure(
         raise InputError(f"finest = {finest:g}: allowed is a number below all of omega_h = {ladder} [1]")
     for scheme in path_schemes:
         validation.choice("path_schemes", scheme, EVALUATIONS)
-    found = _distributions(scene, launches, ladder, finest, throws)
-    found |= _paths(scene, launches, path_schemes, numbers("path_omega_h", path_omega_h, "1", above=0), paths)
+    path_ladder = numbers("path_omega_h", path_omega_h, "1", above=0)
+    stages = (
+        partial(_distributions, scene, launches, ladder, finest, throws),
+        partial(_paths, scene, launches, path_schemes, path_ladder, paths),
+    )
+    thrown = throws * sum(1 / value for value in (finest, *ladder))
+    followed = paths * sum(1 / value for value in path_ladder) * sum(EVALUATIONS[scheme] for scheme in path_schemes)
+    found: dict[str, Variable] = {}
+    for stage in progress.each(stages, [thrown, _DEARER * followed]):
+        found |= stage()
     found |= coordinates(face=die.FACES, omega_h=ladder, path_omega_h=list(path_omega_h), scheme=list(path_schemes))
     told = {"throws": throws, "paths": paths, "finest_omega_h": finest, "seed": seed, "orientation": orientation}
     told |= {"velocity_spread": launches.velocity_spread, "spin": spin, "spin_spread": spin_spread}
@@ -86,12 +89,15 @@ def _distributions(
     scene: Scene, launches: LaunchDistribution, ladder: Sequence[float], finest: float, throws: int
 ) -> dict[str, Variable]:
     """Return the variables of the distributions at each ωh, compared with those at the finest."""
-    best = throwing.many(scene, launches, BATCHED, steps_at(scene, finest), throws)
+    # Another seed: samples that share launches agree more than distributions do.
+    other = dataclasses.replace(launches, seed=launches.seed + 1)
+    asked = [(launches, finest, False), *((other, value, True) for value in ladder)]
+    best, *coarse = [
+        throwing.many(scene, drawn, BATCHED, steps_at(scene, value), throws, empty=empty)
+        for drawn, value, empty in progress.each(asked, [1 / value for _, value, _ in asked])
+    ]
     rows = []
-    for value in ladder:
-        # Another seed: samples that share launches agree more than distributions do.
-        other = dataclasses.replace(launches, seed=launches.seed + 1)
-        found = throwing.many(scene, other, BATCHED, steps_at(scene, value), throws, empty=True)
+    for found in coarse:
         total, settled = max(1, found.counts.sum()), found.counts.sum() / throws
         share = best.counts / best.counts.sum()
         mean, most = counting.sampling_distance(share, int(total), int(best.counts.sum()))
@@ -118,16 +124,16 @@ def _paths(
     best = land(scene, drawn, scheme=REFERENCE, steps=_INTERVALS, early_stop=False)
     away = np.linalg.norm(best.ends["position"][:, :2] - drawn["position"][:, :2], axis=1)
     errors, changed, work = np.zeros((3, len(schemes), len(ladder)))
-    for i, scheme in enumerate(schemes):
-        for j, value in enumerate(ladder):
-            steps = steps_at(scene, value)
-            found = land(scene, drawn, scheme=scheme, steps=steps, early_stop=False)
-            with np.errstate(invalid="ignore", over="ignore"):
-                off = np.linalg.norm(found.ends["position"] - best.ends["position"], axis=1) / np.median(away)
-            errors[i, j] = np.median(np.where(np.isfinite(off), off, np.inf))
-            changed[i, j] = (found.face != best.face).mean()
-            decided = land(scene, drawn, scheme=scheme, steps=steps)
-            work[i, j] = decided.steps.mean() * EVALUATIONS[scheme]
+    places = [*itertools.product(enumerate(schemes), enumerate(ladder))]
+    for (i, scheme), (j, value) in progress.each(places, [EVALUATIONS[by] / at for (_, by), (_, at) in places]):
+        steps = steps_at(scene, value)
+        found = land(scene, drawn, scheme=scheme, steps=steps, early_stop=False)
+        with np.errstate(invalid="ignore", over="ignore"):
+            off = np.linalg.norm(found.ends["position"] - best.ends["position"], axis=1) / np.median(away)
+        errors[i, j] = np.median(np.where(np.isfinite(off), off, np.inf))
+        changed[i, j] = (found.face != best.face).mean()
+        decided = land(scene, drawn, scheme=scheme, steps=steps)
+        work[i, j] = decided.steps.mean() * EVALUATIONS[scheme]
     by = ("scheme", "path_omega_h")
     return {
         "path_error": quantity(by, errors, "distance from the reference at the end over that thrown, median"),

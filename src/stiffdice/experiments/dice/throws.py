@@ -6,7 +6,6 @@ import dataclasses
 import math
 import os
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +19,7 @@ from stiffdice.experiments.dice.counts import Counts
 from stiffdice.integrators import linear_stability
 from stiffdice.scene import die
 from stiffdice.scene.scene import Launch, Scene
+from stiffdice.simulation import progress
 from stiffdice.simulation.landing import BATCHED, MODEL, STILL, Rest, faces_of, land
 from stiffdice.simulation.launch_distribution import LaunchDistribution
 from stiffdice.simulation.run import Run, simulate
@@ -145,24 +145,21 @@ def many(
     count: int,
     *,
     empty: bool = False,
-    progress: Callable[[float], None] | None = None,
 ) -> Throws:
     """Return the counts of many throws; raises InputError as `land` does, and where no throw settles, unless `empty`.
 
-    As many threads share them as cores are allowed. progress: called with the fraction done.
+    As many threads share them as cores are allowed.
     """
     counts, rests, times, evaluations = np.zeros(len(die.FACES), np.int64), dict.fromkeys(Rest, 0), [], 0.0
-    for first in range(0, count, _BATCH):
+    for first in progress.each(range(0, count, _BATCH)):
         drawn = launches.draw(scene, min(_BATCH, count - first), first)
-        part = land(scene, drawn, steps=steps, scheme=scheme, threads=_cores())
+        part = land(scene, drawn, steps=steps, scheme=scheme, threads=_cores(), progress=progress.tell)
         settled = part.rest == Rest.SETTLED
         counts += counting.counted(part.face, settled)
         for rest in Rest:
             rests[rest] += int((part.rest == rest).sum())
         evaluations += float(part.steps.sum())
         times.append(part.steps[settled] * (scene.duration / steps))
-        if progress is not None:
-            progress((first + len(drawn)) / count)
     if counts.sum() == 0 and not empty:
         told = max(rests, key=lambda rest: rests[rest]).sentence
         raise InputError(f"--steps = {steps}: no throw settled ({told}); allowed are more steps, or a longer duration")

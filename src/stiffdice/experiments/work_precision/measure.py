@@ -25,6 +25,7 @@ from stiffdice.experiments.work_precision.problems import MEASURES, PROBLEMS, SA
 from stiffdice.integrators import registry as schemes
 from stiffdice.scene import validation
 from stiffdice.scene.scene import Scene
+from stiffdice.simulation import progress
 from stiffdice.simulation.engines import registry as engines
 from stiffdice.simulation.engines.registry import ENGINES, PEERS, SOLVERS, Path
 from stiffdice.simulation.run import simulate
@@ -191,7 +192,7 @@ def measure(
     names, fit = chosen_from(chosen, methods), methods_for(chosen)
     sources = [name for name in REFERENCES if name in fit]
     found, agreement, floor = [], [], []
-    for ground in scenes:
+    for ground in progress.each(scenes):
         paths = [path_of(chosen, ground, name, REFERENCES[name], budget) for name in sources]
         judge = Judge(chosen, ground, paths[0].states)
         agreement.append([list(judge.errors(path.states).values()) for path in paths])
