@@ -102,7 +102,7 @@ def test_what_is_left_goes_by_what_jobs_took_so_far(duration, study):
 def test_a_job_that_is_under_way_is_half_done_when_it_says_so(duration, study):
     shard = of(study, "shard")[0]
     told = duration.Duration({"quick": study}, due(study, shard), 1)
-    run(study, shard, datetime.now(UTC), "50% of the steps done", seconds=50)
+    run(study, shard, datetime.now(UTC), "50% done", seconds=50)
     assert seconds_left(told) == pytest.approx(100, rel=0.05)
 
 

@@ -164,7 +164,7 @@ def test_progress_is_told_by_tenths(tmp_path):
         "    for k in range(1000): tell((k + 1) / 1000)",
         log=log,
     )
-    assert log.read_text().splitlines()[2:-2] == [f"{k}0% of the steps done" for k in range(1, 11)]
+    assert log.read_text().splitlines()[2:-2] == [f"{k}0% done" for k in range(1, 11)]
     assert job_log.read(log).progress == 1
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
@@ -34,14 +34,16 @@ def each(items: Sequence[_Item], work: Sequence[float] | None = None) -> Iterato
 
     work: how much work each is, in any unit; None takes all for the same.
     """
-    hears, ends = _HEARS.get(), [*itertools.accumulate(work or [1.0] * len(items))]
-    for item, end, share in zip(items, ends, work or [1.0] * len(items), strict=True):
-        if hears is None:
+    hears, shares = _HEARS.get(), work or [1.0] * len(items)
+    if hears is None:
+        yield from items
+        return
+    whole, done = math.fsum(shares), 0.0
+    for item, share in zip(items, shares, strict=True):
+        with told_to(_within(hears, done / whole, share / whole)):
             yield item
-            continue
-        with told_to(_within(hears, (end - share) / ends[-1], share / ends[-1])):
-            yield item
-        hears(end / ends[-1])
+        done += share
+        hears(done / whole)
 
 
 def _within(hears: Callable[[float], None], begin: float, share: float) -> Callable[[float], None]:

@@ -26,14 +26,14 @@ _MOST, _LARGEST_BENCHMARK, _DIGITS = 1 << 20, 10_000, 16
 # should; the signal that told it to stop. `begun` and `failed` are below.
 asked = "asked: {}".format
 made = "made: {} {}".format
-tenth = "{:.0%} of the steps done".format
+tenth = "{:.0%} done".format
 cells = "{} cells, {} runs".format
 memory = "memory: {:.0f} MB".format
 done = "done in {:.1f} s".format
 interrupted = "interrupted: told to stop ({})".format
 
 _BEGUN = re.compile(r"^begun (\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ) by process (\d{1,10}) on (.+)$", re.MULTILINE)
-_TENTH = re.compile(r"^(\d{1,3})% of the steps done$", re.MULTILINE)
+_TENTH = re.compile(r"^(\d{1,3})% done$", re.MULTILINE)
 _ASKED = re.compile(r"^asked: ([a-z0-9 -]{1,200})$", re.MULTILINE)
 _MADE = re.compile(r"^made: ([A-Za-z0-9_./-]{1,300}) ([0-9a-f]{16})$", re.MULTILINE)
 _CELLS = re.compile(r"^(\d{1,18}) cells, \d+ runs$", re.MULTILINE)
