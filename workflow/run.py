@@ -88,7 +88,8 @@ def table(jobs: dict[str, list[tuple[float, float]]], elapsed: float, cores: int
     lines.append(f"{'all':12}{sum(map(len, jobs.values())):6}{total:9.1f} s{simulated:10.1f} s")
     lines.append(
         f"{elapsed:.0f} s on {cores} core{'s' if cores > 1 else ''}: {simulated / (elapsed * cores):.0%} of them "
-        f"simulation, {(total - simulated) / (elapsed * cores):.0%} start-up, files and drawing, the rest Snakemake"
+        f"simulation, {(total - simulated) / (elapsed * cores):.0%} start-up, files and drawing, the rest Snakemake "
+        "and idle cores"
     )
     return "\n".join(lines)
 

@@ -40,7 +40,7 @@ def coarse_steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
     panels = figure.subplots(3, len(experiments), sharey="row", sharex="col", squeeze=False)
     for column, (name, dataset) in enumerate(experiments.items()):
         _distributions(panels[0, column], dataset)
-        panels[0, column].set_title(f"{name}\n{int(dataset.attrs['throws']):,} throws at each step size")
+        panels[0, column].set_title(f"{name}\n{int(dataset.attrs['throws']):,} throws each")
         _paths(panels[1, column], dataset, "face_changed")
         _paths(panels[2, column], dataset, "path_error")
         panels[2, column].set_yscale("log")
@@ -50,7 +50,7 @@ def coarse_steps(experiments: Mapping[str, xr.Dataset], title: str) -> Figure:
         panels[row, 0].set_ylabel(text)
     schemes = dict.fromkeys(name for found in experiments.values() for name in meanings_of(found.scheme))
     handles = [
-        style.mark("faces: symplectic Euler, numbers are ωh", color=style.BLUE, marker="o"),
+        style.mark("faces: symplectic euler", color=style.BLUE, marker="o"),
         style.area("two samples of one distribution: 95 % are below", style.FAINT),
         *(style.line(f"paths: {name.replace('_', ' ')}", markersize=3, **style.METHOD_LOOKS[name]) for name in schemes),
         style.line(f"aims: {_DISTANCE:g} of faces, {_PATH:.0%} of a path", color=style.QUIET, linestyle=":"),
@@ -64,9 +64,9 @@ def _distributions(panel: Any, dataset: xr.Dataset) -> None:
     order = np.argsort(work)
     panel.fill_between(work[order], 1e-4, dataset.sampling_95.values[order], color=style.FAINT, linewidth=0)
     panel.plot(work[order], distance[order], color=style.BLUE, marker="o", markersize=3)
-    for k, (x, y, value) in enumerate(zip(work, distance, dataset.omega_h.values, strict=True)):
-        aside = (3, 4) if k % 2 else (-3, -11)  # neighbours may be near
-        panel.annotate(f"{value:g}", (x, y), xytext=aside, textcoords="offset points", fontsize=style.SMALL)
+    values = ", ".join(f"{value:g}" for value in dataset.omega_h.values[order])
+    place = {"transform": panel.transAxes, "ha": "right", "va": "top", "fontsize": style.SMALL}
+    panel.text(0.98, 0.95, f"ωh from the left:\n{values}", **place)
     panel.axhline(_DISTANCE, color=style.QUIET, linewidth=0.8, linestyle=":")
     panel.set(xscale="log", yscale="log", ylim=(2e-4, 1))
     panel.xaxis.set_minor_formatter(NullFormatter())
