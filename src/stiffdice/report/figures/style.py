@@ -15,6 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogLocator, NullLocator
 
 from stiffdice.errors import printable
@@ -173,7 +174,7 @@ def new_figure(title: str, width: float = COLUMN, height: float = 2.4) -> Figure
 
 def add_note(figure: Figure, text: str) -> None:
     """Write a quiet line under the panels, above the legend if there is one, in as many as it takes: what was run."""
-    text = _wrapped(text, 23 * figure.get_figwidth())
+    text = _fitting(text, figure.get_figwidth())
     if figure.legends:
         (legend,) = figure.legends
         legend.set_title("\n".join(filter(None, (text, legend.get_title().get_text()))))
@@ -188,8 +189,18 @@ def add_legend(figure: Figure, handles: Sequence[Any], title: str = "") -> None:
     longest = max(len(line) for label in labels for line in label.splitlines())
     columns = min(len(labels), max(1, int(22 * width / (longest + 9))))
     look: dict[str, Any] = {"columnspacing": 1.2, "handlelength": 2.2}
-    title = _wrapped(title, 23 * width)
+    title = _fitting(title, width)
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, title=title, **look)
+
+
+def _fitting(text: str, width: float) -> str:
+    """Return a small text in lines that are no longer than a figure of this width [in]."""
+    for letters in range(int(23 * width), 1, -1):
+        lines = _wrapped(text, letters)
+        widths = (TextPath((0, 0), line, size=SMALL).get_extents().width for line in lines.splitlines())
+        if max(widths, default=0.0) <= 70 * width:  # of 72 points an inch
+            break
+    return lines
 
 
 def _wrapped(text: str, width: float) -> str:
