@@ -221,8 +221,7 @@ def _callable(part: _Part) -> Any:
     def call(*arguments: Any) -> Any:
         return part(*arguments)
 
-    options = {"error_model": "numpy", "fastmath": False, "nopython": True}
-    return _Dispatcher(call, targetoptions=options, pipeline_class=_KernelCompiler)
+    return _Dispatcher(call, targetoptions={"nopython": True}, pipeline_class=_KernelCompiler)
 
 
 class _ChoiceCompiler(_FunctionCompiler):  # type: ignore[misc]
